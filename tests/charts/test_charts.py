@@ -2,6 +2,7 @@
 
 import itertools
 import re
+from collections import Counter
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -10,13 +11,13 @@ import matplotlib.image
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 import slipsweep
 from slipsweep.charts import kinds, maps, solved, style
 from slipsweep.charts.slices import Result
-from slipsweep.charts.solved import newmark
 from slipsweep.charts.style import Options
 from slipsweep.cli import main
 from slipsweep.errors import InputError
@@ -67,11 +68,6 @@ def labelled(figure: Figure, begin: str) -> list[Any]:
     return [line for line in figure.axes[0].lines if str(line.get_label()).startswith(begin)]
 
 
-def points(line: Any) -> tuple[np.ndarray, np.ndarray]:
-    xs, ys = line.get_data()
-    return np.asarray(xs, float), np.asarray(ys, float)
-
-
 def legend(figure: Figure) -> list[str]:
     return [text.get_text() for text in figure.legends[0].get_texts()]
 
@@ -81,10 +77,10 @@ def caption(figure: Figure) -> str:
     return " ".join(figure.get_supxlabel().split())
 
 
-def inside(area: Any, points: Any) -> Any:
+def inside(area: Any, cells: Any) -> Any:
     """Which points a filled area covers, those on its edge among them."""
     (path,) = area.get_paths()
-    return path.contains_points(points, radius=1e-9) | path.contains_points(points, radius=-1e-9)
+    return path.contains_points(cells, radius=1e-9) | path.contains_points(cells, radius=-1e-9)
 
 
 # -------------------------------------------------------------------------- lines and contours
@@ -103,11 +99,9 @@ def test_lines_of_yield_and_mode_limit_lie_where_the_equations_put_them(grid: xr
         along, values = vertices.T if y == "amplitude" else vertices.T[::-1]
         on_grid = np.isin(along, grid[other])
         assert on_grid.sum() > 3
-        if other == "frequency":
-            np.testing.assert_allclose(values, expected[name].item(), rtol=1e-12)
-        else:
-            stable = expected[name].where(expected.yield_acceleration > 0).sel(theta=along[on_grid])
-            np.testing.assert_allclose(values[on_grid], stable, rtol=1e-12)
+        stable = expected[name].where(expected.yield_acceleration > 0)
+        stable = stable.sel(theta=along[on_grid]) if stable.dims else stable
+        np.testing.assert_allclose(values[on_grid], stable, rtol=1e-12)
 
 
 def test_lines_over_a_displacement_amplitude() -> None:
@@ -131,8 +125,7 @@ def test_contours_lie_where_the_displacement_is_their_level(grid: xr.Dataset) ->
         for level, segments in zip(side.levels, side.allsegs, strict=True):
             every = np.concatenate([*segments, np.empty((0, 2))])
             # between rows the amplitude is interpolated too
-            shown = every[np.isclose(every[:, 1:], AMPLITUDES).any(axis=1)]
-            rows = shown[::5]
+            rows = every[np.isclose(every[:, 1:], AMPLITUDES).any(axis=1)][::5]
             for frequency, amplitude in rows:
                 exact = slipsweep.sweep(6.0, 0.45, amplitude, frequency, excitation=SINE).permanent_displacement
                 assert exact.item() == pytest.approx(10**level, rel=0.02)  # straight in f between points
@@ -165,9 +158,8 @@ def test_hatching_is_where_validity_says_so(grid: xr.Dataset, x: str) -> None:
     mesh = np.stack(np.meshgrid(grid[x], grid.amplitude), axis=-1).reshape(-1, 2)
     seen = 0
     for flag in ~NOTES:
-        expected = (cells.values & int(flag)) != 0
-        patches = named(figure, (flag.name or "").lower())
-        small = re.search(rf"{(flag.name or '').lower()} \((\d+) cell", caption(figure))
+        expected, name = (cells.values & int(flag)) != 0, (flag.name or "").lower()
+        patches, small = named(figure, name), re.search(rf"{name} \((\d+) cell", caption(figure))
         left = int(small[1]) if small else 0
         covered = inside(patches[0], mesh).reshape(cells.shape) if patches else np.zeros(cells.shape, bool)
         assert not (covered & ~expected).any()
@@ -196,18 +188,15 @@ def test_what_no_block_does_is_marked_and_its_share_told(lined: xr.Dataset) -> N
     assert below.any()
     figure = lined.slipsweep.chart("curve", at={"theta": 14, "mu_s": 0.25, "frequency": 1})
     (line,) = named(figure, "unsound")
-    xs, ys = points(line)
+    xs, ys = line.get_data()
     np.testing.assert_array_equal(np.isin(amplitudes, xs[np.isfinite(ys)]), falls | below)
     share = [f"{100 * one.sum() / shown.sum():.2g} %" for one in (falls | below, falls, below)]
-    assert f"{share[0]} of the sliding cells shown. The displacement falls with A in {share[1]} and lies" in caption(
-        figure
-    )
-    assert f"below half of Newmark's in {share[2]}" in caption(figure)
+    trends = f"The displacement falls with A in {share[1]} and lies below half of Newmark's in {share[2]}"
+    assert f"{share[0]} of the sliding cells shown. {trends}" in caption(figure)
     ratio = lined.slipsweep.chart("newmark", at={"mu_s": 0.25, "frequency": 1})
     (patch,) = named(ratio, style.UNSOUND)
-    np.testing.assert_array_equal(
-        inside(patch, np.stack([np.full_like(amplitudes, 14.0), amplitudes], axis=-1)), falls | below
-    )
+    cells = np.stack([np.full_like(amplitudes, 14.0), amplitudes], axis=-1)
+    np.testing.assert_array_equal(inside(patch, cells), falls | below)
     sound = slipsweep.sweep(5.0, 0.4, [2.0, 4.0, 6.0], 1.0, model="newmark").slipsweep.chart("curve")
     assert "falls with A" not in caption(sound)
 
@@ -225,35 +214,32 @@ def test_one_curve_has_newmarks_beside(grid: xr.Dataset, lined: xr.Dataset) -> N
             slipsweep.sweep(6.0, 0.45, **given, model=model).permanent_displacement.values * 1000
             for model in ("mendez", "newmark")
         )
-        xs, ys = points(labelled(figure, "this result")[0])
+        xs, ys = labelled(figure, "this result")[0].get_data()
         on_grid = np.isin(xs, grid[x]) & np.isfinite(ys)
         np.testing.assert_allclose(ys[on_grid], ours[np.isin(grid[x], xs[on_grid])], rtol=1e-12)
         assert on_grid.sum() > 10
         (line,) = named(figure, "newmark")
-        np.testing.assert_allclose(points(line)[1], np.where(theirs > 0, theirs, np.nan), rtol=1e-12)
+        np.testing.assert_allclose(line.get_ydata(), np.where(theirs > 0, theirs, np.nan), rtol=1e-12)
         assert "Newmark's block" in legend(figure)
 
 
 def test_newmarks_block_over_its_yield_coefficient(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     ky = np.linspace(0.05, 0.4, 8)
-    result = slipsweep.sweep(
-        yield_coefficient=ky, amplitude=np.linspace(1, 6, 11), frequency=[0.5, 1, 2], model="newmark"
-    )
+    given: dict[str, Any] = {"amplitude": np.linspace(1, 6, 11), "frequency": [0.5, 1, 2], "model": "newmark"}
+    result = slipsweep.sweep(yield_coefficient=ky, **given)
     result.to_netcdf("ky.nc")
     assert main(["chart", "ky.nc"]) == 0
     assert capsys.readouterr().out.split() == [
         f"ky-{kind}.png" for kind in ("contours", "modes", "families", "dimensionless")
     ]
     assert main(["report", "ky.nc"]) == 0
-    figure = result.slipsweep.chart(at={"amplitude": 3.0, "frequency": 1})
-    xs, ys = points(labelled(figure, "Newmark's block")[0])
-    np.testing.assert_array_equal(xs, ky)
-    expected = result.permanent_displacement.sel(amplitude=3.0, frequency=1) * 1000
-    np.testing.assert_allclose(ys, expected.where(expected > 0))
-    assert "no sliding: Üy above A" in legend(figure)
-    over_amplitude = result.slipsweep.chart(at={"ky": ky[2], "frequency": 1})
-    expected = result.permanent_displacement.sel(yield_coefficient=ky[2], frequency=1) * 1000
-    np.testing.assert_allclose(points(labelled(over_amplitude, "Newmark's block")[0])[1], expected.where(expected > 0))
+    for at in ({"amplitude": 3.0, "frequency": 1}, {"ky": ky[2], "frequency": 1}):
+        figure = result.slipsweep.chart(at=at)
+        expected = result.permanent_displacement.rename(yield_coefficient="ky").sel(at) * 1000
+        xs, ys = labelled(figure, "Newmark's block")[0].get_data()
+        np.testing.assert_array_equal(xs, expected[expected.dims[0]])
+        np.testing.assert_allclose(ys, expected.where(expected > 0))
+        assert ("no sliding: Üy above A" in legend(figure)) == ("amplitude" in at)
     (line,) = named(result.slipsweep.chart("modes", at={"frequency": 1}), "yield_line")
     along, amplitudes = np.concatenate(line.allsegs[0]).T
     np.testing.assert_allclose(amplitudes, along * 9.81, rtol=1e-12)
@@ -266,7 +252,7 @@ def test_the_dimensionless_chart_is_of_any_frequency(grid: xr.Dataset) -> None:
         figure = grid.slipsweep.chart("dimensionless", y="mu_s", at=at)
         for mu_s in (0.3, 0.6):
             onset = slipsweep.friction_parameters(6.0, mu_s, 1.0).yield_acceleration.item()
-            found = dict(zip(*points(labelled(figure, f"μs = {mu_s:g}")[0]), strict=True))
+            found = dict(zip(*labelled(figure, f"μs = {mu_s:g}")[0].get_data(), strict=True))
             u = grid.permanent_displacement.sel(theta=6, mu_s=mu_s, frequency=FREQUENCIES[12]).values
             ys = np.array([found[x] for x in AMPLITUDES / onset])
             there = np.isfinite(ys) & (ys > 0)
@@ -282,14 +268,12 @@ def test_ratio_to_newmark_is_that_of_a_direct_sweep(lined: xr.Dataset) -> None:
     ours, theirs = (
         slipsweep.sweep(**given, frequency=1.0, model=model, excitation=LINED_SINE) for model in ("mendez", "newmark")
     )
-    np.testing.assert_array_equal(newmark(ours), theirs.permanent_displacement)
     kept = slipsweep.flags(ours).not_recoupled.values == 0
     ratio = ours.permanent_displacement.values / theirs.permanent_displacement.values.clip(1e-300)
     ratio = ratio[kept & (theirs.permanent_displacement.values > 0) & (ratio > 0)]
     low, middle, high = np.quantile(ratio, (0.05, 0.5, 0.95))
-    assert f"median {middle:.3g}; 90 % of the sliding cells shown lie between {low:.3g} and {high:.3g}." in caption(
-        figure
-    )
+    text = f"median {middle:.3g}; 90 % of the sliding cells shown lie between {low:.3g} and {high:.3g}."
+    assert text in caption(figure)
 
 
 def test_curves_break_at_the_mode_limit(grid: xr.Dataset) -> None:
@@ -297,10 +281,10 @@ def test_curves_break_at_the_mode_limit(grid: xr.Dataset) -> None:
     limit = slipsweep.friction_parameters(6.0, 0.45, 1.0).limiting_acceleration.item()
     beyond = int(np.searchsorted(AMPLITUDES, limit))
     for line, jump in zip(labelled(figure, "f = "), named(figure, "jump"), strict=True):
-        xs, ys = points(line)
+        xs, ys = line.get_data()
         assert (xs[beyond], np.isnan(ys[beyond])) == (AMPLITUDES[beyond], True)
-        np.testing.assert_array_equal(points(jump)[0], AMPLITUDES[[beyond - 1, beyond]])
-        np.testing.assert_array_equal(points(jump)[1], ys[[beyond - 1, beyond + 1]])
+        np.testing.assert_array_equal(jump.get_xdata(), AMPLITUDES[[beyond - 1, beyond]])
+        np.testing.assert_array_equal(jump.get_ydata(), ys[[beyond - 1, beyond + 1]])
 
 
 def test_values_that_are_unreliable_leave_a_gap(lined: xr.Dataset) -> None:
@@ -308,11 +292,10 @@ def test_values_that_are_unreliable_leave_a_gap(lined: xr.Dataset) -> None:
     flags = slipsweep.flags(direct)
     assert flags.not_recoupled.any()
     assert flags.upslope.any()
+    at: dict[str, Any] = {"theta": 14, "frequency": 1, "mu_s": (0.25, 0.35)}
     for shown in (False, True):
-        figure = lined.slipsweep.chart(
-            "families", at={"theta": 14, "frequency": 1, "mu_s": (0.25, 0.35)}, show_cautions=shown
-        )
-        xs, ys = points(labelled(figure, "μs = 0.25")[0])
+        figure = lined.slipsweep.chart("families", at=at, show_cautions=shown)
+        xs, ys = labelled(figure, "μs = 0.25")[0].get_data()
         seen = [bool(np.isfinite(ys[xs == amplitude]).any()) for amplitude in direct.amplitude.values]
         # a logarithmic axis has no place for upslope
         expected = ~flags.upslope.values if shown else ~(flags.not_recoupled | flags.upslope).values
@@ -320,13 +303,12 @@ def test_values_that_are_unreliable_leave_a_gap(lined: xr.Dataset) -> None:
         text = caption(figure)
         assert ("Drawn on request: values flagged not_recoupled" in text) == shown
         assert ("Left out: values flagged not_recoupled (does not come to rest" in text) == (not shown)
-        (mark,) = [one for one in named(figure, "caution") if np.isfinite(points(one)[1]).any()][:1]
+        (mark,) = [one for one in named(figure, "caution") if np.isfinite(one.get_ydata()).any()][:1]
         assert mark.get_linewidth() > 5
     velocity = lined.slipsweep.chart(
-        "families", at={"theta": 14, "mu_s": (0.25,), "frequency": 1}, variable="peak_relative_velocity", x="amplitude",
-        y="mu_s", show_cautions=True,
-    )  # fmt: skip
-    assert np.isfinite(points(labelled(velocity, "μs = 0.25")[0])[1][-1])  # of a block that ends upslope it is above 0
+        "families", y="mu_s", at=at | {"mu_s": (0.25,)}, variable="peak_relative_velocity", show_cautions=True
+    )
+    assert np.isfinite(labelled(velocity, "μs = 0.25")[0].get_ydata()[-1])  # of a block that ends upslope it is above 0
 
 
 @pytest.mark.parametrize("kind", ["contours", "newmark"])
@@ -343,7 +325,7 @@ def test_a_single_point_is_barred_too_and_angles_are_not_logarithmic() -> None:
     figure = result.slipsweep.chart("curve", x="theta", width="90mm")
     assert figure.axes[0].get_xscale() == "linear"
     (line,) = named(figure, "caution")
-    there = np.isfinite(points(line)[1])
+    there = np.isfinite(line.get_ydata())
     assert there.any()
     assert line.get_marker() == "."
     figure.draw_without_rendering()
@@ -373,7 +355,7 @@ def test_spread_is_between_the_options_there_are(lined: xr.Dataset) -> None:
     expected["this result:\nλ by Eq. 6, stop by Eq. 12"] = expected["λ by Eq. 6, stop by Eq. 12"]
     rows = []
     for label, answer in expected.items():
-        xs, ys = points(labelled(figure, label)[0])
+        xs, ys = labelled(figure, label)[0].get_data()
         values = answer.permanent_displacement.values * 1000
         at = np.searchsorted(xs, amplitudes, side="right") - 1  # behind the gap at the mode limit
         np.testing.assert_allclose(ys[at], np.where(values > 0, values, np.nan), rtol=1e-12)
@@ -390,31 +372,22 @@ def test_spread_is_between_the_options_there_are(lined: xr.Dataset) -> None:
 
 def test_only_what_is_shown_is_read(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Counting the values that are loaded, chart by chart."""
-    read: dict[str, int] = {}
+    read: Counter[str] = Counter()
     original = xr.Dataset.load
 
     def counted(self: xr.Dataset, **options: Any) -> xr.Dataset:
-        for name, one in self.data_vars.items():
-            read[str(name)] = read.get(str(name), 0) + one.size
+        read.update({str(name): one.size for name, one in self.data_vars.items()})
         return original(self, **options)
 
-    thetas, amplitudes, frequencies = 11, 53, 25
-    expected = {
-        "contours": amplitudes * frequencies,
-        "modes": thetas * amplitudes,
-        "families": 5 * amplitudes,  # every sixth frequency
-        "curve": amplitudes,
-        "dimensionless": 4 * amplitudes,
-        "newmark": thetas * amplitudes,
-        "spread": amplitudes,
-    }
+    # times 53 amplitudes: 25 frequencies, 11 angles, every sixth frequency, one, 4 coefficients of friction
+    curves = {"contours": 25, "modes": 11, "families": 5, "curve": 1, "dimensionless": 4, "newmark": 11, "spread": 1}
+    monkeypatch.setattr(xr.Dataset, "load", counted)
     with slipsweep.open_result(path) as data:
-        for kind, count in expected.items():
+        for kind, count in curves.items():
             read.clear()
-            monkeypatch.setattr(xr.Dataset, "load", counted)
             kinds.draw(Result(data, "grid"), kind, Options())
-            monkeypatch.undo()
-            assert read == {"sliding_mode" if kind == "modes" else "permanent_displacement": count, "validity": count}
+            drawn = "sliding_mode" if kind == "modes" else "permanent_displacement"
+            assert read == {drawn: count * 53, "validity": count * 53}
 
 
 @pytest.mark.parametrize(("theta", "mu_s"), [(6.0, 0.45), (4.9, 0.45), (6.0, 0.37), (19.3, 0.59)])
@@ -423,9 +396,7 @@ def test_slices_are_at_the_very_values_requested(grid: xr.Dataset, theta: float,
     keep: dict[str, Any] = {"frequency": slice(None), "amplitude": slice(None)}
     found = Result(grid, "grid").select(["permanent_displacement", "validity"], keep, {"theta": theta, "mu_s": mu_s})
     direct = slipsweep.sweep(theta, mu_s, AMPLITUDES, FREQUENCIES, excitation=SINE)
-    for name in ("theta", "mu_s"):
-        assert found[name].item() == direct[name].item()
-    for name in ("permanent_displacement", "validity"):
+    for name in ("theta", "mu_s", "permanent_displacement", "validity"):
         np.testing.assert_array_equal(found[name].transpose(*direct[name].dims), direct[name])
 
 
@@ -445,7 +416,6 @@ def test_values_on_axes_are_found_as_messages_print_them(grid: xr.Dataset) -> No
     assert find(result, {"mu_s": 0.3333})["mu_s"][0].index is None  # a number is what it is
     wrong: tuple[tuple[dict[str, Any], str], ...] = (
         ({"frequency": "1.2"}, r"frequency = 1.2: not among the values of the result; its neighbours are 0.948683 and"),
-        ({"mu_s": "0.5"}, "mu_s = 0.5: outside the range of the result, 0.3 to 0.4"),
         ({"theta": 6}, "theta = 6: outside the range of the result, 5 degree"),
         ({"thta": 5}, 'did you mean "theta"'),
     )
@@ -493,9 +463,8 @@ def test_acceleration_in_g(lined: xr.Dataset) -> None:
         vertices = np.concatenate(named(figure, "yield_line")[0].allsegs[0])
         drawn = vertices[np.isin(vertices[:, 0], lined.theta), 1]
         np.testing.assert_allclose(drawn, np.sort(expected)[::-1] / (9.81 if units == "g" else 1), rtol=1e-12)
-    assert "A = 0.5 g" in caption(
-        lined.slipsweep.chart("modes", x="theta", y="mu_s", at={"amplitude": "0.5g"}, units="g")
-    )
+    modes = lined.slipsweep.chart("modes", x="theta", y="mu_s", at={"amplitude": "0.5g"}, units="g")
+    assert "A = 0.5 g" in caption(modes)
 
 
 def test_ratios_have_one_order_of_lightness() -> None:
@@ -524,8 +493,9 @@ def test_a_narrow_grey_chart_is_legible(lined: xr.Dataset, kind: str) -> None:
         assert handle is not None
         if isinstance(handle, Line2D):
             assert handle.get_linestyle() not in ("", "None") or handle.get_marker() not in ("", "None")
-    canvas = np.asarray(_pixels(figure), float)
-    assert np.ptp(canvas[..., :3], axis=-1).max() <= 2
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    assert np.ptp(np.asarray(canvas.buffer_rgba(), float)[..., :3], axis=-1).max() <= 2
 
 
 @pytest.mark.parametrize("kind", ["contours", "newmark"])
@@ -534,14 +504,6 @@ def test_a_grey_colour_bar_has_the_same_numbers(lined: xr.Dataset, kind: str) ->
     coloured, grey = ([text.get_text() for text in bar.get_yticklabels()] for bar in bars)
     assert coloured == grey
     assert ("30 mm" if kind == "contours" else "3") in grey
-
-
-def _pixels(figure: Figure) -> Any:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    return canvas.buffer_rgba()
 
 
 def test_curves_and_modes_differ_without_colour(lined: xr.Dataset) -> None:
@@ -571,11 +533,9 @@ def test_cases_tell_curves_and_panels_apart() -> None:
     figure = result.slipsweep.chart("families", y="case", at={"frequency": 2})
     (line,) = labelled(figure, "steep")
     assert "steep: θ = 12°, μs = 0.5." in caption(figure)
-    np.testing.assert_array_equal(np.unique(points(line)[0]), result.amplitude)
-    assert [axes.get_title() for axes in result.slipsweep.chart("contours", panels=["case"]).axes[:2]] == [
-        "gentle",
-        "steep",
-    ]
+    np.testing.assert_array_equal(np.unique(line.get_xdata()), result.amplitude)
+    panels = result.slipsweep.chart("contours", panels=["case"]).axes[:2]
+    assert [axes.get_title() for axes in panels] == ["gentle", "steep"]
     picked = result.slipsweep.chart("contours", at={"case": "steep"})
     assert picked.get_supxlabel().startswith("case steep: θ = 12°")
     for options, message in (
@@ -590,16 +550,16 @@ def test_cases_tell_curves_and_panels_apart() -> None:
 def test_little_to_draw(grid: xr.Dataset) -> None:
     """All zero, all missing, one value: what can be drawn is, and the rest says why."""
     small = slipsweep.sweep([0.0, 5.0, 30.0], [0.3, 0.5], [1.0, 2.0, 4.0, 7.0], [1.0, 2.0, 4.0])
-    for fill, undrawn in ((0.0, {"families", "dimensionless"}), (np.nan, {"families", "dimensionless"})):
+    for fill in (0.0, np.nan):
         data = small.assign(permanent_displacement=small.permanent_displacement * 0 + fill)
         result, options = Result(data, "small"), Options()
         figures, left_out = kinds.draw_all(result, kinds.fitting(result, options), options, strict=False)
-        assert set(left_out) == undrawn
+        assert set(left_out) == {"families", "dimensionless"}
         assert "No contours: no values" in caption(figures["contours"])
     single = small.permanent_displacement.where(small.amplitude == 7.0, 0.0)
     figure = small.assign(permanent_displacement=single).slipsweep.chart("families", at={"theta": 0, "mu_s": 0.5})
     for line in labelled(figure, "f = "):  # a line through one point is none: it has a marker
-        assert np.isfinite(points(line)[1][np.asarray(line.get_markevery())]).tolist() == [True]
+        assert np.isfinite(line.get_ydata()[np.asarray(line.get_markevery())]).tolist() == [True]
 
 
 # ----------------------------------------------------------------------- the command line
@@ -633,49 +593,27 @@ def test_formats(path: Path, here: Path, capsys: pytest.CaptureFixture[str]) -> 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--at", "theta=45"), "theta = 45: outside the range of the result, 0 to 20 degree"),
-        (("--at", "theta=steep"), 'theta = "steep": must be a number, with a unit that converts to degree'),
-        (("--at", "theta"), "--at theta: must be NAME=VALUE"),
-        (("--kind", "contour"), 'did you mean "contours"?'),
-        (("--kind", "contours", "--variable", "validity"), "is a code"),
-        (("--kind", "contours", "--x", "theta", "--y", "theta"), "--y theta: no such axis"),
-        (("--kind", "contours", "--x", "theta", "--at", "theta=3"), "is an axis of this chart"),
-        (
-            ("-k", "modes", "--at", "theta=6", "--at", "mu_s=0.3", "--at", "frequency=1"),
-            "needs another axis with two values or more",
-        ),
-        (("-o", "a.png"), "give one --kind"),
-        (("-k", "contours", "--levels", "1cm"), "levels: 0.01: must be two different values or more"),
-        (("--kind", "modes", "-o", "a.gif"), "must end in one of .png, .svg, .pdf"),
-        (("--kind", "modes", "--width", "9mm"), "width = 9mm: must be 50 to 1000 mm"),
+        ("--at theta=45", "theta = 45: outside the range of the result, 0 to 20 degree"),
+        ("--at theta=steep", 'theta = "steep": must be a number, with a unit that converts to degree'),
+        ("--at theta", "--at theta: must be NAME=VALUE"),
+        ("--kind contour", 'did you mean "contours"?'),
+        ("--kind contours --variable validity", "is a code"),
+        ("--kind contours --x theta --y theta", "--y theta: no such axis"),
+        ("--kind contours --x theta --at theta=3", "is an axis of this chart"),
+        ("-k modes --at theta=6 --at mu_s=0.3 --at frequency=1", "needs another axis with two values or more"),
+        ("-o a.png", "give one --kind"),
+        ("-k contours --levels 1cm", "levels: 0.01: must be two different values or more"),
+        ("--kind modes -o a.gif", "must end in one of .png, .svg, .pdf"),
+        ("--kind modes --width 9mm", "width = 9mm: must be 50 to 1000 mm"),
     ],
 )
-def test_bad_commands(
-    path: Path, here: Path, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], message: str
-) -> None:
-    assert main(["chart", str(path), *arguments]) == 2
+def test_bad_commands(path: Path, here: Path, capsys: pytest.CaptureFixture[str], arguments: str, message: str) -> None:
+    assert main(["chart", str(path), *arguments.split()]) == 2
     printed = capsys.readouterr()
     assert printed.err.startswith("slipsweep: error: ")
     assert printed.err.count("\n") == 1
     assert message in printed.err
     assert list(here.iterdir()) == []
-
-
-def test_results_without_an_axis_or_an_attribute(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    rows = slipsweep.sweep(xr.DataArray([2.0, 12.0], dims="case"), 0.5, 4.0, 1.0)
-    rows.to_netcdf("rows.nc")
-    assert main(["chart", "rows.nc", "-o", "a.png"]) == 2
-    assert "this chart needs an axis with two values or more" in capsys.readouterr().err
-    kept = {name: value for name, value in rows.attrs.items() if name != "recoupling"}
-    for changed, message in (
-        (rows.drop_attrs(deep=False).assign_attrs(kept), "attribute 'recoupling': missing; it says what was solved"),
-        (
-            rows.assign_coords(amplitude=rows.amplitude.assign_attrs(units="g")),
-            'amplitude: units = "g"; must be "m s-2"',
-        ),
-    ):
-        with pytest.raises(InputError, match=message):
-            changed.slipsweep.chart("families")
 
 
 def test_all_charts_of_a_file_are_a_pdf_with_a_title_page(path: Path, here: Path) -> None:
@@ -696,10 +634,14 @@ def test_all_charts_of_a_file_are_a_pdf_with_a_title_page(path: Path, here: Path
     ("spoil", "message"),
     [
         (lambda data: data.assign_attrs(rise=7.5), "attributes do not say what was solved"),
+        (lambda data: data.attrs.pop("recoupling"), "attribute 'recoupling': missing; it says what was solved"),
+        (lambda data: data.amplitude.attrs.update(units="g"), 'amplitude: units = "g"; must be "m s-2"'),
         (lambda data: data.isel(theta=slice(0)), "holds no cells"),
+        (lambda data: data.swap_dims(theta="case").isel(amplitude=0, frequency=0), "needs an axis with two values"),
     ],
 )
 def test_a_spoilt_result_is_refused_in_one_line(spoil: Any, message: str) -> None:
-    data = slipsweep.sweep([5.0, 6.0], [0.3, 0.4], [2.0, 4.0], [1.0, 2.0])
+    data = slipsweep.sweep([5.0, 6.0], 0.3, [2.0, 4.0], [1.0, 2.0])
+    changed = spoil(data)
     with pytest.raises(InputError, match=message):
-        kinds.figure_of(spoil(data), "a.nc", "contours")
+        (changed if isinstance(changed, xr.Dataset) else data).slipsweep.chart("families")

@@ -13,6 +13,7 @@ from slipsweep.cli import main
 from slipsweep.errors import InputError
 from slipsweep.model.variables import INTENSITY_MEASURES
 from slipsweep.motion.intensity import intensity_measures
+from tests.charts.test_charts import caption, labelled, legend, named
 
 SWEEPS = Path(__file__).parents[2] / "sweeps"
 
@@ -33,15 +34,6 @@ def result(suite: slipsweep.Suite) -> xr.Dataset:
     )  # fmt: skip
 
 
-def labelled(figure: Figure, gid: str) -> list[Any]:
-    """Artists of a chart's first axes with a name."""
-    return [child for child in figure.axes[0].get_children() if child.get_gid() == gid]
-
-
-def caption(figure: Figure) -> str:
-    return " ".join(figure.get_supxlabel().split())
-
-
 def check_regression(figure: Figure, xs: np.ndarray, ys: np.ndarray) -> None:
     """Least squares of ln u over ln of the measure, by numpy."""
     slid = ys > 0
@@ -50,7 +42,7 @@ def check_regression(figure: Figure, xs: np.ndarray, ys: np.ndarray) -> None:
     scatter = np.sqrt(np.sum((logs[1] - intercept - slope * logs[0]) ** 2) / (slid.sum() - 2))
     explained = np.corrcoef(*logs)[0, 1] ** 2
     assert figure.axes[0].get_title() == f"slope {slope:.2f}, R² = {explained:.2f}, σ = {scatter:.2f}"
-    (line,) = labelled(figure, "regression")
+    (line,) = named(figure, "regression")
     np.testing.assert_allclose(line.get_ydata(), np.exp(intercept) * line.get_xdata() ** slope, rtol=1e-9)
 
 
@@ -75,7 +67,7 @@ def test_median_and_band_are_quantiles_of_all_motions(result: xr.Dataset, x: str
     figure = result.slipsweep.chart("motions", x=x, at=at)
     values = displacements(result, **at)
     expected = np.quantile(values, [0.16, 0.5, 0.84], axis=values.dims.index("each"))
-    (median,), edges, lines = (labelled(figure, gid) for gid in ("median", "edge", "motion"))
+    (median,), edges, lines = (named(figure, gid) for gid in ("median", "edge", "motion"))
     low = figure.axes[0].get_ylim()[0]
     for line, row in zip((edges[0], median, edges[1]), expected, strict=True):
         np.testing.assert_array_equal(line.get_xdata(), result[x])
@@ -84,8 +76,7 @@ def test_median_and_band_are_quantiles_of_all_motions(result: xr.Dataset, x: str
         np.testing.assert_allclose(line.get_ydata()[seen], row[seen], rtol=1e-12)
         assert (line.get_ydata()[~seen] < low).all()  # zero lies below the axis, not nowhere
     drawn = np.sort([line.get_ydata() for line in lines], axis=0)
-    settled = result.assign(permanent_displacement=result.permanent_displacement.where(
-        slipsweep.flags(result).not_recoupled == 0))  # fmt: skip
+    settled = result.where(slipsweep.flags(result).not_recoupled == 0)
     shown = np.sort(displacements(settled, **at).transpose("each", x), axis=0)
     np.testing.assert_allclose(drawn[shown >= low], shown[shown >= low], rtol=1e-12)
     zeros = (values == 0).sum("each").max().item()
@@ -93,7 +84,7 @@ def test_median_and_band_are_quantiles_of_all_motions(result: xr.Dataset, x: str
     assert "8 motions in 2 polarities; all have a value." in text
     assert ("Zero displacement: up to" in text) == (zeros > 0)
     assert "Üy by Coulomb" in text
-    (theirs,) = labelled(figure, "newmark")  # the result is of Newmark's block itself
+    (theirs,) = named(figure, "newmark")  # the result is of Newmark's block itself
     np.testing.assert_array_equal(theirs.get_ydata(), median.get_ydata())
 
 
@@ -105,7 +96,7 @@ def test_motions_without_a_value_are_counted_by_reason(suite: slipsweep.Suite) -
     assert 0 < most < 8
     figure = result.slipsweep.chart()
     assert f"up to {most} of 8 have no value and are left out (uplift {most})" in caption(figure)
-    (median,) = labelled(figure, "median")
+    (median,) = named(figure, "median")
     expected = 1000.0 * np.asarray(np.nanquantile(result.permanent_displacement, 0.5, axis=1))
     seen = expected > figure.axes[0].get_ylim()[0]
     assert seen.any()
@@ -118,23 +109,18 @@ def test_intensity_is_that_of_the_motion_as_it_shakes_the_block(suite: slipsweep
     stretched = 1.0 if measure == "mean_period" else 1.25  # it is of frequencies that time does not change
     result = slipsweep.sweep(5.0, 0.3, 5.0, excitation=suite, time_scale=stretched)
     figure = result.slipsweep.chart("intensity", x=measure)
-    factors = result.motion_factor.values
-    expected = []
-    for label, factor in zip(suite.labels, factors, strict=True):
-        one = suite[label]
-        assert isinstance(one, slipsweep.Record)
-        shaken = slipsweep.Record(one.times * stretched, one.acceleration * factor)
-        expected.append(intensity_measures(shaken)[measure])
-    (points,) = labelled(figure, "a motion")
+    pairs = zip(suite.components, result.motion_factor.values, strict=True)
+    shaken = [slipsweep.Record(one.times * stretched, one.acceleration * factor) for one, factor in pairs]
+    expected = np.array([intensity_measures(one)[measure] for one in shaken])
+    values = result.permanent_displacement.values * 1000.0
     if measure == "pga":  # all are scaled to it
         assert figure.axes[0].get_title() == "no regression: one value for all motions"
     else:
-        check_regression(figure, np.array(expected), result.permanent_displacement.values * 1000.0)
-    values = result.permanent_displacement.values * 1000.0
-    low = figure.axes[0].get_ylim()[0]
-    shown = values >= low
+        check_regression(figure, expected, values)
+    (points,) = named(figure, "a motion")
+    shown = values >= figure.axes[0].get_ylim()[0]
     assert shown.sum() > 3
-    np.testing.assert_allclose(points.get_xdata(), np.array(expected)[shown], rtol=1e-9)
+    np.testing.assert_allclose(points.get_xdata(), expected[shown], rtol=1e-9)
     np.testing.assert_allclose(points.get_ydata(), values[shown], rtol=1e-12)
 
 
@@ -172,7 +158,7 @@ def test_fragility_is_the_share_of_motions_that_exceed(result: xr.Dataset) -> No
     values = displacements(result, **at)
     for line, threshold in zip(figure.axes[0].lines[:2], (1.0, 50.0), strict=True):
         np.testing.assert_array_equal(line.get_ydata(), (values > threshold).mean("each"))
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["d = 1 mm", "d = 50 mm"]
+    assert legend(figure) == ["d = 1 mm", "d = 50 mm"]
     # the same of the statistics themselves
     found = slipsweep.suite_statistics(result, thresholds=["1mm", "5cm"])
     again = found.slipsweep.chart("fragility", at=at)
@@ -183,8 +169,8 @@ def test_fragility_is_the_share_of_motions_that_exceed(result: xr.Dataset) -> No
 def test_some_motions_of_a_suite(result: xr.Dataset, suite: slipsweep.Suite) -> None:
     chosen = suite.labels[:2]
     figure = result.slipsweep.chart("motions", at={"motion": chosen, "polarity": -1, "theta": 5, "mu_s": 0.3})
-    assert len(labelled(figure, "motion")) == 2
-    (median,) = labelled(figure, "median")
+    assert len(named(figure, "motion")) == 2
+    (median,) = named(figure, "median")
     values = result.permanent_displacement.sel(motion=list(chosen), polarity=-1, theta=5, mu_s=0.3)
     assert median.get_ydata()[-1] == pytest.approx(1000.0 * values.isel(amplitude=-1).median().item(), rel=1e-12)
 
@@ -207,8 +193,7 @@ def test_a_single_record() -> None:
     record = slipsweep.read_record(SWEEPS / "data" / "synthetic.csv")
     result = slipsweep.sweep(5.0, [0.3, 0.4], excitation=record, scale=[1.0, 1.5, 2.0], polarity="both")
     figure = result.slipsweep.chart(show_cautions=True)
-    curves = [line for line in figure.axes[0].lines if str(line.get_label()).startswith("μs")]
-    for line, mu_s in zip(curves, result.mu_s, strict=True):
+    for line, mu_s in zip(labelled(figure, "μs"), result.mu_s, strict=True):
         expected = result.permanent_displacement.sel(mu_s=mu_s, polarity=1) * 1000.0  # the record as it is
         np.testing.assert_allclose(line.get_ydata()[expected > 0], expected[expected > 0], rtol=1e-12)
 
@@ -224,12 +209,11 @@ def test_newmarks_block_is_solved_under_the_record_in_the_file(tmp_path: Path) -
         expected = 1000 * slipsweep.sweep(
             0, 0.3, excitation=record, scale=data.scale.values, time_scale=2.0, polarity=-1, model="newmark"
         ).permanent_displacement  # fmt: skip
-        (line,) = labelled(data.slipsweep.chart(at=at), "newmark")
+        (line,) = named(data.slipsweep.chart(at=at), "newmark")
         np.testing.assert_allclose(line.get_ydata(), expected.where(expected > 0), rtol=1e-12)
         without = data.drop_vars(["record_time", "record_acceleration"]).slipsweep.chart(at=at)
-    texts = [text.get_text() for text in without.legends[0].get_texts()]
-    assert "falls with A" in texts
-    assert not any("Newmark" in text for text in texts)
+    assert "falls with A" in legend(without)
+    assert not any("Newmark" in text for text in legend(without))
 
 
 # --------------------------------------------------------------------- drawn as a whole
@@ -241,10 +225,10 @@ def test_limits_of_a_suite(suite: slipsweep.Suite) -> None:
     missing = limits.limit_amplitude.isnull().sum("motion").values
     assert 0 < missing[-1] < 4
     figure = limits.slipsweep.chart()
-    (median,) = labelled(figure, "median")
+    (median,) = named(figure, "median")
     ordered = np.sort(limits.limit_amplitude.fillna(np.inf).values, axis=-1)
     np.testing.assert_allclose(median.get_ydata(), ordered[:, 3:5].mean(axis=1) / 9.81, rtol=1e-12)
-    assert len(labelled(figure, "motion")) == 8
+    assert len(named(figure, "motion")) == 8
     assert f"{missing.sum()} of 16 limits are above" in caption(figure)
     # where nothing varies but the motion, they lie along the abscissa
     axes = Figure().subplots()
@@ -263,7 +247,7 @@ def test_every_half_wave_of_a_history_has_its_mode() -> None:
     assert min(history.stick_slip_pulses, history.continuous_pulses, np.count_nonzero(modes == 0)) > 0
     figure = history.slipsweep.chart("history")
     for name, mode in (("stuck", 0), ("stick_slip", 1), ("continuous", 2)):
-        (boxes,) = labelled(figure, name)
+        (boxes,) = named(figure, name)
         spans = np.array([path.get_extents().intervalx for path in boxes.get_paths()])
         np.testing.assert_allclose(spans[:, 0], history.half_wave_start[modes == mode], rtol=1e-12)
         np.testing.assert_allclose(spans[:, 1], history.half_wave_end[modes == mode], rtol=1e-12)
@@ -290,7 +274,7 @@ def test_annual_rates(result: xr.Dataset) -> None:
     axes = Figure().subplots()
     assert rates.slipsweep.chart(ax=axes) is axes
     figure = slipsweep.displacement_hazard(result.sel(mu_s=0.3), curve, [0.001, 0.01, 0.1]).slipsweep.chart()
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["θ = 5°", "θ = 20°"]
+    assert legend(figure) == ["θ = 5°", "θ = 20°"]
     short = slipsweep.HazardCurve(np.array([0.5, 4.0]), np.array([1e-2, 8e-3]))
     figure = slipsweep.displacement_hazard(result.sel(theta=5.0), short, [0.001, 0.01]).slipsweep.chart()
     assert "above the end of the hazard curve, where" in caption(figure)
@@ -337,7 +321,7 @@ def test_statistics_are_drawn_as_they_are() -> None:
         np.testing.assert_array_equal(line.get_ydata(), at.exceedance_probability.sel(threshold=threshold))
     assert "uncertain: μs ~ lognorm(s=0.1, scale=0.4), A × lognorm(s=0.3)" in caption(figure)
     bands = found.slipsweep.chart("quantiles", at={"frequency": 2})
-    (median,) = (line for line in bands.axes[0].lines if line.get_label() == "median")
+    (median,) = labelled(bands, "median")
     np.testing.assert_allclose(median.get_ydata(), at.displacement_quantile.sel(quantile=0.5) * 1000.0)
     lines = {line.get_label(): line for line in found.slipsweep.chart("sensitivity", at={"frequency": 2}).axes[0].lines}
     for symbol, name in (("A", "amplitude"), ("μs", "mu_s")):

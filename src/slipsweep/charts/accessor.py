@@ -107,10 +107,9 @@ class SlipsweepAccessor:
         'permanent displacement, downslope (mm)'
         """
         from slipsweep.charts.kinds import figure_of
-        from slipsweep.files.selection import own_names
 
         figure = figure_of(
-            self._dataset, kind=kind, at=own_names(self._dataset, at or {}), x=x, y=y, panels=panels,
-            variable=variable, levels=levels, units=units, show_cautions=show_cautions, width=width, grey=grey, ax=ax,
+            self._dataset, kind, at=at, x=x, y=y, panels=panels, variable=variable, levels=levels, units=units,
+            show_cautions=show_cautions, width=width, grey=grey, ax=ax,
         )  # fmt: skip
         return figure if ax is None else ax

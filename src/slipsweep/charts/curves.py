@@ -21,9 +21,6 @@ from slipsweep.model.variables import CAUTIONS, RESULTS, STRENGTHS
 
 Curve = tuple[style.Floats, style.Floats]
 
-#: Least value of u ω² / A on its axis, where the largest is far above.
-_LEAST_SCALED = 1e-4
-
 _NEWMARK: Look = {"color": "0.5", "linewidth": 0.8, "zorder": 1.8}
 _JUMP: Look = {"linestyle": ":", "linewidth": 1.0, "zorder": 1.9}
 _CAUTION: Look = {"color": "0.8", "linewidth": 7, "markersize": 14, "solid_capstyle": "butt", "zorder": 1.5}
@@ -79,15 +76,20 @@ def dimensionless(result: Result, options: style.Options) -> Figure:
 
 def _drawn(sheet: Sheet, name: str, scaled: bool = False) -> Figure:
     """Curves of a result, of the displacement with Newmark's; `scaled` as uω²/A over A/Üy."""
-    units = sheet.options.unit(name)
-    factor, units = (1000.0, "mm") if units == "m" else (1.0, units)
-    label, least = f"{RESULTS[name]['long_name']} ({units})".removesuffix(" ()"), 1.0 if factor > 1 else None
+    factor: Any = 1000.0 if style.unit(name) == "m" else 1.0
+    divisor: Any = 1.0
+    units, least = ("mm", 1.0) if factor > 1 else (sheet.options.unit(name), None)
+    label = f"{RESULTS[name]['long_name']} ({units})".removesuffix(" ()")
     sheet.show(name, "Barred curves")
     if scaled:
-        label, least, factor = "permanent displacement, u\u00a0ω²\u00a0/\u00a0A", _LEAST_SCALED, 0.0
+        label, least = "permanent displacement, u\u00a0ω²\u00a0/\u00a0A", 1e-4
+        factor, divisor = (2 * math.pi * sheet.data["frequency"]) ** 2, sheet.data["amplitude"]
+        sheet.data["over_yield"] = divisor / sheet.data["yield_line"]
     else:
         sheet.set_axis("x")
-    every = [_curves(panel, panel.data["drawn"], factor) for panel in sheet.panels]
+    for one in {"drawn", "newmark"} & {*sheet.data}:
+        sheet.data[one] = sheet.data[one] * factor / divisor
+    every = [_curves(panel, panel.data["drawn"]) for panel in sheet.panels]
     # the paper's axis of A/Üy begins at the yield acceleration
     values = np.concatenate([ys[xs > 1] if scaled else ys for curves in every for xs, ys in curves])
     for panel, curves in zip(sheet.panels, every, strict=True):
@@ -95,8 +97,8 @@ def _drawn(sheet: Sheet, name: str, scaled: bool = False) -> Figure:
         looks = curve_looks(len(curves)) if panel.y else [{"color": style.BLUE, "linestyle": "-", "marker": ""}]
         for member, (curve, look) in enumerate(zip(curves, looks, strict=True)):
             _draw(sheet, panel, curve, member, len(curves), look)
-        _underlay(sheet, panel, factor)
-        theirs = _curves(panel, panel.data["newmark"], factor, gaps=False) if "newmark" in sheet.data else []
+        _underlay(sheet, panel)
+        theirs = _curves(panel, panel.data["newmark"], gaps=False) if "newmark" in sheet.data else []
         for curve, look in zip(theirs, looks, strict=False):
             _draw_newmark(sheet, panel, curve, look)
         if scaled:
@@ -116,6 +118,7 @@ def spread(result: Result, options: style.Options) -> Figure:
     sheet = result.sheet(options, result.compared(solved.DISPLACEMENT), solved.DRIVES)
     # the others have a mode limit, whatever this one is
     sheet.show(solved.DISPLACEMENT, "Barred, of this result", always=True)
+    sheet.data["drawn"] = sheet.data["drawn"] * 1000.0
     sheet.set_axis("x")
     flags: list[xr.DataArray] = []
     answers = [_answers(sheet, panel, flags) for panel in sheet.panels]
@@ -131,7 +134,7 @@ def spread(result: Result, options: style.Options) -> Figure:
         for number, (text, (curve, look)) in enumerate(curves.items()):
             place = number / len(curves)
             sheet.legend[text] = plot_curve(panel.axes, *_above_zero(curve), place, label=text, **look)
-        _underlay(sheet, panel, 1000.0)
+        _underlay(sheet, panel)
         _mark_accelerations(sheet, panel)
     sheet.note_left_out(solved.DISPLACEMENT, *flags)
     sheet.notes.append("All results have the same Üy; λ = 2 to 3 is what the paper measured on its interface.")
@@ -150,26 +153,22 @@ def _answers(sheet: Sheet, panel: Panel, flags: list[xr.DataArray]) -> dict[str,
     for text, (model, changed, look) in options.items():
         answer = solved.solve(data, [solved.DISPLACEMENT, "validity"], model, **changed)
         flags.append(answer["validity"])
-        drawn = reliable(answer, solved.DISPLACEMENT, panel.options)
-        found[text] = _curves(panel, drawn, 1000.0)[0], {"linewidth": 1.0, "markersize": 3.5, **look}
+        drawn = reliable(answer, solved.DISPLACEMENT, panel.options) * 1000.0
+        found[text] = _curves(panel, drawn)[0], {"linewidth": 1.0, "markersize": 3.5, **look}
     text = style.NEWMARK
     if own is ours:
         given = sheet.data.coords.get("decay_rate")
         decay = "λ by Eq. 6" if given is None else f"λ = {given.item():.3g}" if given.size == 1 else "λ as given"
         text = f"{decay}, stop by {'Eq. 12' if own.options['recoupling'] == 'eq12' else 'integration'}"
     heavy: Look = {"color": "black", "linewidth": 2.4, "zorder": 2.5}
-    return {**found, f"this result:\n{text}": (_curves(panel, data["drawn"], 1000.0)[0], heavy)}
+    return {**found, f"this result:\n{text}": (_curves(panel, data["drawn"])[0], heavy)}
 
 
-def _curves(panel: Panel, array: xr.DataArray, factor: float, gaps: bool = True) -> list[Curve]:
-    """The curves of a panel times `factor`, of 0 as uω²/A over A/Üy, with `gaps` where they pass the mode limit."""
-    if factor:
-        curves = [(panel.xs, ys * factor) for ys in panel.grid(array)]
-    else:
-        amplitude = panel.grid("amplitude")
-        with np.errstate(divide="ignore", invalid="ignore"):
-            scaled = panel.grid(array) * (2 * math.pi * panel.grid("frequency")) ** 2 / amplitude
-            curves = list(zip(amplitude / panel.grid("yield_line"), scaled, strict=True))
+def _curves(panel: Panel, array: xr.DataArray, gaps: bool = True) -> list[Curve]:
+    """The curves of a panel, with `gaps` where they pass the mode limit."""
+    rows = panel.grid(array)
+    abscissae = panel.grid("over_yield") if "over_yield" in panel.data else [panel.xs] * len(rows)
+    curves = list(zip(abscissae, rows, strict=True))
     if "limit_line" not in panel.data or not gaps:
         return curves
     beyond = panel.grid("amplitude") > panel.grid("limit_line")
@@ -203,7 +202,7 @@ def _draw_newmark(sheet: Sheet, panel: Panel, curve: Curve, look: Look) -> None:
     sheet.remarks[text] = Line2D([], [], **(_NEWMARK if panel.y else own))
 
 
-def _underlay(sheet: Sheet, panel: Panel, factor: float) -> None:
+def _underlay(sheet: Sheet, panel: Panel) -> None:
     """Put a broad grey line under what a caution is about, and a barred one under what no block does."""
     drawn = panel.data["drawn"]
     flagged = (drawn > 0) & has_flags(panel.data["validity"], CAUTIONS)
@@ -214,7 +213,7 @@ def _underlay(sheet: Sheet, panel: Panel, factor: float) -> None:
         text = style.UNSOUND if "newmark" in panel.data else "falls with A"
         marks.append(("unsound", text, _UNSOUND, panel.data["unsound"]))
     for gid, text, look, cells in marks:
-        for xs, ys in _curves(panel, drawn.where(cells).transpose(*drawn.dims), factor):
+        for xs, ys in _curves(panel, drawn.where(cells)):
             plot_curve(panel.axes, xs, ys, gid=gid, **look)
         if cells.any():
             sheet.remarks[text] = Line2D([], [], **look)

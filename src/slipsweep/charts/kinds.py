@@ -1,7 +1,7 @@
 """What is drawn of which result, by command and from Python: the kinds of charts, and all of them as one PDF."""
 
 import textwrap
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from slipsweep.charts.solved import DISPLACEMENT, is_newmark, is_recorded
 from slipsweep.charts.style import Options
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.opening import values_text
+from slipsweep.files.selection import At, own_names
 from slipsweep.model.variables import PARAMETERS, REFERENCE
 
 Draw = Callable[[Result, Options], Figure]
@@ -37,9 +38,6 @@ SORTS: dict[str, tuple[str, tuple[Draw, ...]]] = {
     "calibration": ("a calibration", (histories.calibration,)),
     "hazard": ("annual rates", (limits.hazard,)),
 }  # fmt: skip
-
-#: Characters in a line of a title page.
-_WIDTH = 96
 
 
 def kinds_of(sort: str) -> dict[str, Draw]:
@@ -93,16 +91,15 @@ def draw(result: Result, kind: str | None, options: Options) -> Figure:
             raise InputError(f"{result.name}: {error.args[0]}: not there, but {kind} needs it") from None
 
 
-def figure_of(data: xr.Dataset, name: str = "dataset", kind: str | None = None, **chosen: Any) -> Figure:
+def figure_of(data: xr.Dataset, kind: str | None = None, at: Mapping[str, At] | None = None, **chosen: Any) -> Figure:
     """Draw a chart of a dataset: the options are those of `SlipsweepAccessor.chart`."""
-    return draw(Result(data, name), kind, Options(**chosen))
+    return draw(Result(data, "dataset"), kind, Options(at=own_names(data, at or {}), **chosen))
 
 
 def draw_all(
     result: Result, kinds: Iterable[str], options: Options, *, strict: bool
 ) -> tuple[dict[str, Figure], dict[str, str]]:
     """Several charts, and why others cannot be drawn; InputError as `draw` if `strict`, or if none can be drawn."""
-    result.places(options.at)
     figures: dict[str, Figure] = {}
     left_out: dict[str, str] = {}
     for kind in kinds:
@@ -162,6 +159,6 @@ def title_page(result: Result) -> Figure:
     for heading, texts in sections.items():
         lines += ["", heading.upper()]
         for text in texts:
-            lines += textwrap.wrap(text, _WIDTH, initial_indent="  ", subsequent_indent="    ")
+            lines += textwrap.wrap(text, 96, initial_indent="  ", subsequent_indent="    ")
     figure.text(0.08, 0.86, "\n".join(lines), fontsize="small", va="top", linespacing=1.4)
     return figure

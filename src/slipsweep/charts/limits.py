@@ -16,12 +16,8 @@ from slipsweep.files.selection import axis_labels
 from slipsweep.model.variables import LimitStatus
 from slipsweep.studies.suite_statistics import SUITE, limit_quantiles
 
-#: What is drawn along the abscissa, and as curves, in order of preference.
-_ABSCISSAE = ("frequency", "mu_s", "theta", "displacement")
-_CURVES = ("theta", "displacement", "mu_s", "case")
-
-#: Most grid points of annual rates, a curve each; most displacements that are marked, and those of a smooth curve.
-_MOST_CURVES, _MOST_MARKS, _POINTS = 8, 20, 121
+#: Most grid points of annual rates, a curve each; most displacements that are marked.
+_MOST_CURVES, _MOST_MARKS = 8, 20
 
 
 def limit(result: Result, options: Options) -> Figure:
@@ -31,9 +27,11 @@ def limit(result: Result, options: Options) -> Figure:
     median and the 16 to 84 % band; where nothing but the motion varies, the motions lie along the abscissa.
     """
     suite = SUITE if "motion" in result.dims else ()
-    along = "motion" if suite and not {*result.wide} - {*SUITE, *options.at} else _ABSCISSAE
+    single = suite and not {*result.wide} - {*SUITE, *options.at}
+    along = "motion" if single else ("frequency", "mu_s", "theta", "displacement")
+    curves = None if suite else ("theta", "displacement", "mu_s", "case")
     names, shown = ["limit_amplitude", "limit_status"], replace(options, more_panels=True)
-    sheet = result.sheet(shown, names, along, curves=None if suite else _CURVES, keep=suite)
+    sheet = result.sheet(shown, names, along, curves=curves, keep=suite)
     for panel in sheet.panels:
         panel.axes.grid(color="0.9", which="both")
         panel.axes.set_ylabel("limit amplitude A / g")
@@ -105,7 +103,7 @@ def drawn_thresholds(data: xr.Dataset, requested: Floats) -> Floats:
     """Displacements, m, that a curve of rates is drawn through: those requested, and as many as a smooth one needs."""
     most = max(np.nanmax(data["permanent_displacement"].values), requested[-1])
     least = min([one for one in requested if one > 0.0] + [most]) / 10.0
-    return np.union1d(np.geomspace(least, most, _POINTS) if most > 0.0 else [], requested)
+    return np.union1d(np.geomspace(least, most, 121) if most > 0.0 else [], requested)
 
 
 def hazard(result: Result, options: Options) -> Figure:

@@ -57,9 +57,6 @@ UNSOUND_HATCH = "///"
 #: Least width and height of a hatched region, inches: a smaller one is a scrap of hatch; the caption counts its cells.
 _SCRAP = 0.09
 
-#: Displacements that people design for, m.
-_LEAST, _MOST = 1e-3, 1.0
-
 #: What a contour's label takes to each side, and what it needs to the next line, inches.
 _LABEL_SPACE, _LINE_SPACE = 0.28, 0.11
 
@@ -193,13 +190,13 @@ def _label_contours(panel: Panel, drawn: Any, texts: dict[float, str]) -> None:
 
 
 def _levels(name: str, values: Floats) -> list[float]:
-    """1-3-10 levels that lie in the values; of displacements those that people design for."""
+    """1-3-10 levels that lie in the values; of displacements those that people design for, 1 mm to 1 m."""
     there = values[np.isfinite(values) & (values > 0)]
     if not there.size:
         return []
     low, high = float(there.min()), float(there.max())
-    if name == DISPLACEMENT and low < _MOST and high > _LEAST:
-        low, high = max(low, _LEAST), min(high, _MOST)
+    if name == DISPLACEMENT and low < 1.0 and high > 1e-3:
+        low, high = max(low, 1e-3), min(high, 1.0)
     else:
         low = max(low, high * 1e-5)
     every = [float(f"{digit}e{decade}") for decade in range(-20, 20) for digit in (1, 3)]

@@ -16,11 +16,8 @@ import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import Collection
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from slipsweep.charts import solved, style
@@ -117,18 +114,14 @@ class Drawing:
 def _without_colour(figure: Figure) -> None:
     """Replace all colours by their lightness."""
     for artist in figure.findobj():
-        kinds: tuple[str, ...] = ()
         if isinstance(artist, ScalarMappable) and artist.get_array() is not None:
-            colours = artist.get_cmap()
-            ends = {"under": colours.get_under(), "over": colours.get_over()}
-            grey = ListedColormap(style.to_grey(colours(np.arange(colours.N))))
-            artist.set_cmap(grey.with_extremes(**{end: style.to_grey(one)[0] for end, one in ends.items()}))
-        elif isinstance(artist, Line2D):
-            kinds = ("color", "markerfacecolor", "markeredgecolor")
-        elif isinstance(artist, Patch | Collection):
-            kinds = ("facecolor", "edgecolor")
-        for kind in kinds:
-            colours = getattr(artist, f"get_{kind}")()
+            given = artist.get_cmap()
+            ends = {"under": given.get_under(), "over": given.get_over()}
+            shades = ListedColormap(style.to_grey(given(np.arange(given.N))))
+            artist.set_cmap(shades.with_extremes(**{end: style.to_grey(one)[0] for end, one in ends.items()}))
+            continue
+        for kind in ("color", "markerfacecolor", "markeredgecolor", "facecolor", "edgecolor"):
+            colours: Any = getattr(artist, f"get_{kind}", list)()
             if len(colours):
                 grey = style.to_grey(colours)
                 artist.set(**{kind: grey if len(grey) > 1 else tuple(grey[0])})
@@ -152,9 +145,13 @@ class Panel:
         """The sheet's slice at the panel's values."""
         return self._sheet.data.isel(self._where, missing_dims="ignore")
 
-    def grid(self, name: str | xr.DataArray) -> Any:
-        """A variable over (y, x); without y of one row."""
-        return over(self.data[name] if isinstance(name, str) else name, self.data, (self.y, self.x))
+    def grid(self, values: str | xr.DataArray, *dims: str | None) -> Any:
+        """Values over (y, x) or other dimensions, in that order, repeated along those they lack; None has length 1."""
+        data, dims = self.data, dims or (self.y, self.x)
+        array, named = data[values] if isinstance(values, str) else values, [dim for dim in dims if dim]
+        lacking = {dim: data.sizes.get(dim, 1) for dim in named if dim not in array.dims}
+        full = array.variable.set_dims({**lacking, **array.sizes}).transpose(*named)
+        return full.values.reshape([full.sizes[dim] if dim else 1 for dim in dims])
 
     def member(self, index: int) -> str:
         """What a curve is called."""
@@ -278,14 +275,6 @@ def member_text(data: xr.Dataset, dim: str, index: int, options: Options) -> str
         return style.plain(labels[index])
     values = axis_numbers(data, dim) if dim in data.sizes else data[dim].values
     return style.value_text(data, dim, float(values[index]), options)
-
-
-def over(array: xr.DataArray, data: xr.Dataset, dims: Sequence[str | None]) -> Any:
-    """A variable's values over `dims`, in that order, repeated along those it lacks; None has length 1."""
-    named = [dim for dim in dims if dim]
-    lacking = {dim: data.sizes.get(dim, 1) for dim in named if dim not in array.dims}
-    full = array.variable.set_dims({**lacking, **array.sizes}).transpose(*named)
-    return full.values.reshape([full.sizes[dim] if dim else 1 for dim in dims])
 
 
 def is_log(values: Floats) -> bool:

@@ -126,7 +126,10 @@ class Result:
         cuts, exact, picked = self.places(at), {}, {}
         index: dict[str, Any] = {}
         for dim in self.dims:
-            chosen: Any = keep[dim] if dim in keep else cuts.get(dim) or [Place(math.nan, self._middle(dim))]
+            middle = 0 if dim in NAMED else (self.data.sizes[dim] - 1) // 2
+            if dim == "polarity":
+                middle = int(np.argmax(self.data[dim].values))
+            chosen: Any = keep[dim] if dim in keep else cuts.get(dim) or [Place(math.nan, middle)]
             if isinstance(chosen, slice):
                 index[dim] = chosen
                 continue
@@ -151,11 +154,6 @@ class Result:
             found = solve(data, solved, motion=self.motion)
             data = data.drop_vars(there if exact else []).assign(found.data_vars)
         return data.assign_attrs(picked=picked)
-
-    def _middle(self, dim: str) -> int:
-        if dim == "polarity":
-            return int(np.argmax(self.data[dim].values))
-        return 0 if dim in NAMED else (self.data.sizes[dim] - 1) // 2
 
     def spread(self, dim: str, number: int) -> list[Place]:
         """At most `number` places on an axis, from end to end, in even steps if a few less have them."""
@@ -199,10 +197,12 @@ class Result:
             if dim in options.at and dim not in keep:
                 why = "is an axis of this chart; it cannot have one value"
                 raise InputError(f"{self.name}: {dim} = {options.at[dim]}: {why}")
+        # more than one value for every two dots on paper are lost
+        thinned = {dim: slice(0, size, math.ceil(size / _POINTS)) for dim, size in self.data.sizes.items()}
         if across not in kept:
-            kept[across] = self._thinned(across)
+            kept[across] = thinned[across]
         if up:
-            kept[up] = self._thinned(up) if y else places.get(up) or self.spread(up, _CURVES)
+            kept[up] = thinned[up] if y else places.get(up) or self.spread(up, _CURVES)
         panels = list(options.panels) or [dim for dim in several if dim not in kept]
         if options.more_panels and not panels:
             panels = [dim for dim in groups if dim not in (*kept, *same, *options.at)]
@@ -229,11 +229,6 @@ class Result:
                 f"there are: {', '.join(there) or 'none'}{fixed}"
             )
         return found
-
-    def _thinned(self, dim: str) -> slice:
-        """A slice of an axis of `_POINTS` values at most: more than one for every two dots on paper are lost."""
-        size = self.data.sizes[dim]
-        return slice(0, size, math.ceil(size / _POINTS))
 
 
 def _sort(data: xr.Dataset) -> str:

@@ -17,10 +17,6 @@ DRIVES = ("amplitude", "displacement_amplitude")
 DISPLACEMENT = "permanent_displacement"
 
 _BLOCK = ("theta", "mu_s", "yield_acceleration")
-_FRICTION = ("decay_rate", "delta_mu", "minimum_friction")
-
-#: The amplitude, over that of a cell, from which the displacement should not fall; what of a displacement is rounding.
-_SMALLER, _ROUNDING = 0.99, 1e-9
 
 
 def is_recorded(data: xr.Dataset) -> bool:
@@ -39,7 +35,8 @@ def solve(
     """Solve the cells of a slice as its result was, or by another model or parameters; None: the model's estimate."""
     chosen = model or MODELS.from_attributes(data.attrs)
     block = ("yield_coefficient",) if "yield_coefficient" in data.coords else _BLOCK
-    wanted = [*block, *(_FRICTION if isinstance(chosen, Mendez) else ()), *WAVEFORM_INPUTS, *RECORD_INPUTS[1:]]
+    friction = ("decay_rate", "delta_mu", "minimum_friction") if isinstance(chosen, Mendez) else ()
+    wanted = (*block, *friction, *WAVEFORM_INPUTS, *RECORD_INPUTS[1:])
     given = {name: _bare(data[name]) for name in wanted if name in data.coords} | changed
     if given.get("displacement_amplitude") is not None:
         given["amplitude"] = None
@@ -54,9 +51,7 @@ def solve(
 
 def _bare(array: xr.DataArray) -> Any:
     """Values along their dimensions, as the public functions take them."""
-    values = np.asarray(array.values, np.float64)
-    coords = {array.name: values} if array.dims == (array.name,) else {}
-    return xr.DataArray(values, dims=array.dims, coords=coords) if array.dims else float(values)
+    return array.astype(np.float64).reset_coords(drop=True)
 
 
 def with_amplitude(data: xr.Dataset) -> xr.Dataset:
@@ -106,10 +101,10 @@ def unsound(data: xr.Dataset, theirs: xr.DataArray | None) -> tuple[xr.DataArray
     if is_recorded(data):
         before = ours.shift({drive: 1}) if drive in ours.dims else ours
     else:
-        before = solve(data, [DISPLACEMENT], **{drive: _bare(data[drive] * _SMALLER)})[DISPLACEMENT]
+        before = solve(data, [DISPLACEMENT], **{drive: _bare(data[drive] * 0.99)})[DISPLACEMENT]
         before = before.assign_coords({drive: ours[drive]} if drive in before.dims else {}).reset_coords(drop=True)
     below = xr.zeros_like(ours, bool) if theirs is None else ours < 0.5 * theirs
-    return (ours < before * (1 - _ROUNDING)) & (ours > 0), below & (ours > 0)
+    return (ours < before * (1 - 1e-9)) & (ours > 0), below & (ours > 0)  # less is rounding
 
 
 def trend_text(falls: xr.DataArray, below: xr.DataArray, sliding: int) -> str:

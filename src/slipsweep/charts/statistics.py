@@ -7,7 +7,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from slipsweep.charts import style
-from slipsweep.charts.sheet import Sheet, curve_looks, log_axis, over, plot_curve
+from slipsweep.charts.sheet import Sheet, curve_looks, log_axis, plot_curve
 from slipsweep.charts.slices import Result
 from slipsweep.charts.solved import DRIVES
 from slipsweep.charts.style import BLUE, VERMILION, Look, Options
@@ -64,7 +64,7 @@ def quantiles(result: Result, options: Options) -> Figure:
     shares = np.atleast_1d(sheet.data["quantile"].values)
     for panel in sheet.panels:
         floor = log_axis(panel.axes, everything, "permanent displacement (mm)", zeros=True)
-        values = over(panel.data["displacement_quantile"], panel.data, ("quantile", panel.x)) * 1000.0
+        values = panel.grid("displacement_quantile", "quantile", panel.x) * 1000.0
         shown, xs, middle = np.maximum(values, floor), panel.xs, shares.size // 2
         for low in range(middle):
             high, colour = shares.size - 1 - low, mpl.colormaps["Blues"](0.2 + 0.3 * low / middle)
@@ -95,8 +95,8 @@ def sensitivity(result: Result, options: Options) -> Figure:
     sheet.set_axis("x")
     for panel in sheet.panels:
         panel.axes.grid(color="0.9")
-        total, first = (over(panel.data[name], panel.data, ("input", panel.x)) for name, *_ in _INDICES)
-        low, high = over(panel.data["total_interval"], panel.data, ("bound", "input", panel.x))
+        total, first = (panel.grid(name, "input", panel.x) for name, *_ in _INDICES)
+        low, high = panel.grid("total_interval", "bound", "input", panel.x)
         for at, look in enumerate(curve_looks(len(inputs))):
             panel.axes.fill_between(panel.xs, low[at], high[at], color=look["color"], alpha=0.15, linewidth=0)
             solid = {**look, "linestyle": "-", "label": symbols[at]}
@@ -112,12 +112,11 @@ def sensitivity(result: Result, options: Options) -> Figure:
 
 def _draw_bars(sheet: Sheet, symbols: list[str]) -> None:
     """Both indices of every input, the largest total index first."""
-    totals = over(sheet.data["total_index"], sheet.data, ("input", sheet.across, sheet.down))
-    order = np.argsort(np.nan_to_num(totals).reshape(len(symbols), -1).sum(axis=1))
+    order = np.argsort(sheet.data["total_index"].sum([dim for dim in (sheet.across, sheet.down) if dim]).values)
     for panel in sheet.panels:
         for (name, interval, text, colour), shift in zip(_INDICES, (0.2, -0.2), strict=True):
-            values = over(panel.data[name], panel.data, ("input",))[order]
-            low, high = over(panel.data[interval], panel.data, ("bound", "input"))[:, order]
+            values = panel.grid(name, "input")[order]
+            low, high = panel.grid(interval, "bound", "input")[:, order]
             at = np.arange(len(order)) + shift
             panel.axes.barh(at, values, height=0.36, color=colour)
             sheet.legend[text] = Patch(color=colour)

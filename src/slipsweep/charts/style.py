@@ -87,9 +87,6 @@ LINES: dict[str, tuple[str, Look]] = {
 
 _UNITS = {"degree": "°", "m s-2": "m/s²", "m s-1": "m/s", "1": ""}
 
-#: Width of a figure that takes the usual size of text, inches; narrower ones are for a column of a journal.
-_WIDE = 5.0
-
 
 @dataclass
 class Options:
@@ -132,8 +129,8 @@ class Options:
 
     @property
     def font(self) -> float:
-        """Size of text, points."""
-        return 10.0 if self.inches is None or self.inches >= _WIDE else 7.0
+        """Size of text, points; smaller in figures for a column of a journal."""
+        return 10.0 if self.inches is None or self.inches >= 5.0 else 7.0
 
     def scale(self, name: str, g: float) -> float:
         """What to multiply a parameter by to draw it."""
@@ -260,9 +257,7 @@ def check_attributes(attrs: Mapping[Any, Any], name: str) -> None:
         if key not in attrs:
             raise InputError(f"{name}: attribute {key!r}: missing; it says what was solved")
     try:
-        MODELS.from_attributes(attrs)
-        if not recorded:
-            WAVEFORMS.from_attributes(attrs)
+        model_text(attrs)
         drawn_text(attrs)
     except (InputError, ValueError, LookupError, TypeError, AttributeError) as error:
         raise InputError(f"{name}: attributes do not say what was solved: {error}") from None

@@ -32,9 +32,6 @@ SCALING = {
     "mean_period": (0, 1),
 }
 
-#: Logarithms of an intensity measure within this are one value: motions scaled to it.
-_SAME = 1e-6
-
 _LABEL = "permanent displacement (mm)"
 
 _THIN: style.Look = {"color": "0.5", "linewidth": 0.7, "zorder": 1.8}
@@ -50,7 +47,7 @@ _BARS: style.Look = {"facecolor": "0.85", "edgecolor": "black", "linewidth": 1.0
 
 def motions(result: Result, options: style.Options) -> Figure:
     """Displacements over one axis: a thin line for each motion, median and 16 to 84 % band, and Newmark's median."""
-    sheet = _sheet(result, options, _axes(result))
+    sheet = _sheet(result, options)
     sheet.show(solved.DISPLACEMENT, "Not marked")
     if options.show_cautions:  # upslope ones lie below the axis, as zeros do
         sheet.data["drawn"] = sheet.data[solved.DISPLACEMENT]
@@ -142,7 +139,7 @@ def histogram(result: Result, options: style.Options) -> Figure:
 
 def fragility(result: Result, options: style.Options) -> Figure:
     """The share of the motions of a suite that exceed a displacement, over one axis."""
-    sheet = _sheet(result, options, _axes(result))
+    sheet = _sheet(result, options)
     found = suite_statistics(sheet.data, thresholds=options.heights or THRESHOLDS)
     _note_suite(sheet, "P is the share of")
     _note_cautions(sheet)
@@ -151,16 +148,13 @@ def fragility(result: Result, options: style.Options) -> Figure:
     return statistics.draw_fragility(drawn)
 
 
-def _axes(result: Result) -> list[str]:
-    """What charts of a suite are drawn over: how strong the motions are, else Üy or ky, or any axis."""
-    return [dim for dim in (*STRENGTHS, "yield_acceleration", "yield_coefficient", *result.wide) if dim not in SUITE]
-
-
-def _sheet(result: Result, options: style.Options, x: str | Sequence[str], more: Sequence[str] = ()) -> Sheet:
-    sheet = result.sheet(options, [*result.compared(solved.DISPLACEMENT), *more], x, keep=SUITE)
-    given = sheet.data[solved.DISPLACEMENT]
-    sheet.data[solved.DISPLACEMENT] = without_rounding(given)
-    if not sheet.data[solved.DISPLACEMENT].equals(given):
+def _sheet(result: Result, options: style.Options, x: str | None = None, more: Sequence[str] = ()) -> Sheet:
+    """A slice, along `x`, or along how strong the motions are, else Üy or ky, or any axis."""
+    axes = [dim for dim in (*STRENGTHS, "yield_acceleration", "yield_coefficient", *result.wide) if dim not in SUITE]
+    sheet = result.sheet(options, [*result.compared(solved.DISPLACEMENT), *more], x or axes, keep=SUITE)
+    given, rounded = sheet.data[solved.DISPLACEMENT], without_rounding(sheet.data[solved.DISPLACEMENT])
+    sheet.data[solved.DISPLACEMENT] = rounded
+    if not rounded.equals(given):
         sheet.notes.append("Displacements below 10⁻¹² m count as zero.")
     return sheet
 
@@ -208,9 +202,9 @@ def _scattered(panel: Panel, measure: str) -> tuple[style.Floats, style.Floats, 
     xs = data[f"motion_{measure}"] * factor**power * time**time_power
     ys = reliable(data, solved.DISPLACEMENT, panel.options) * 1000.0
     every = xr.broadcast(xs, ys, data["polarity"] < 0)
-    xs, ys, reverse = (one.transpose(*every[1].dims).values.ravel() for one in every)  # type: ignore[assignment]
-    there = np.isfinite(ys)
-    return np.asarray(xs)[there], np.asarray(ys)[there], np.asarray(reverse)[there]
+    places, heights, reverse = (one.transpose(*every[1].dims).values.ravel() for one in every)
+    there = np.isfinite(heights)
+    return places[there], heights[there], reverse[there]
 
 
 def _draw_regression(sheet: Sheet, panel: Panel, xs: style.Floats, ys: style.Floats) -> None:
@@ -218,7 +212,7 @@ def _draw_regression(sheet: Sheet, panel: Panel, xs: style.Floats, ys: style.Flo
     slid = (ys > 0) & (xs > 0) & np.isfinite(xs)
     if slid.sum() < 3:
         panel.add_title("no regression: fewer than 3 motions slide")
-    elif np.ptp(np.log(xs[slid])) < _SAME:
+    elif np.ptp(np.log(xs[slid])) < 1e-6:  # motions scaled to it
         panel.add_title("no regression: one value for all motions")
     else:
         found: Any = stats.linregress(np.log(xs[slid]), np.log(ys[slid]))

@@ -22,9 +22,8 @@ from numpy.typing import NDArray
 
 from slipsweep.charts.style import SYMBOLS, caption, is_acceleration, unit
 from slipsweep.errors import InputError
-from slipsweep.explore.excerpt import LAYERS, SHOWN, Excerpt, read_excerpt
+from slipsweep.explore.excerpt import LAYERS, POINTS, SHOWN, Excerpt, Histories, compute_histories, read_excerpt
 from slipsweep.explore.figures import decades, figures, label, scale_of
-from slipsweep.explore.histories import POINTS, Histories, compute_histories
 from slipsweep.files import outputs
 from slipsweep.grid.resources import size_text
 from slipsweep.model import variables as known
@@ -40,10 +39,6 @@ _HISTORIES_BYTES = 4_500_000
 
 #: Powers by which displacements follow from one frequency to others, and from one time scale (MODEL, motion rules).
 _LAWS = {"frequency": -2.0, "time_scale": 2.0}
-
-#: base64 makes four bytes of three.
-_BASE64 = 4 / 3
-
 
 #: An array in the page: type, shape, what else is known of it, and its deflated bytes in base64.
 Array = dict[str, Any]
@@ -110,7 +105,8 @@ def write_page(path: Path, output: Path, *, size: int = PAGE_BYTES, overwrite: b
         if taken <= _CELLS_SHARE * left:
             break
         cells = int(math.prod(excerpt.sizes.values()) * 0.95 * _CELLS_SHARE * left / taken)
-    histories = compute_histories(excerpt, int(min(left - taken, _HISTORIES_BYTES) / _BASE64))
+    # base64 makes four bytes of three
+    histories = compute_histories(excerpt, min(left - taken, _HISTORIES_BYTES) * 3 // 4)
     name = path.name.encode(errors="backslashreplace").decode()  # it may have bytes that are no UTF-8
     text = page(excerpt, arrays, histories, name, script)
     with outputs.complete_or_absent(output, overwrite) as temporary:
@@ -118,18 +114,15 @@ def write_page(path: Path, output: Path, *, size: int = PAGE_BYTES, overwrite: b
     return excerpt
 
 
-def page(excerpt: Excerpt, arrays: Mapping[str, Array], histories: Histories | None, name: str, bokeh: str) -> str:
+def page(excerpt: Excerpt, arrays: dict[str, Array], histories: Histories | None, name: str, bokeh: str) -> str:
     """Return the page's HTML; `name` is that of the file, `bokeh` Bokeh's library."""
     from jinja2 import Environment
     from markupsafe import Markup
 
     attrs = excerpt.table.attrs
     if histories is not None:
-        arrays = {
-            **arrays,
-            "histories": packed(histories.values.astype("<i2")),
-            "history_scale": packed(histories.scale.astype("<f4")),
-        }
+        arrays["histories"] = packed(histories.values.astype("<i2"))
+        arrays["history_scale"] = packed(histories.scale.astype("<f4"))
     files = importlib.resources.files("slipsweep.explore")
     script = (files / "page.js").read_text(encoding="utf-8")
     environment = Environment(autoescape=True)
@@ -176,12 +169,8 @@ def _contents(excerpt: Excerpt, arrays: Mapping[str, Array], histories: Historie
         "coords": {key: _dimension(str(key)) for key, coord in table.coords.items() if key not in coord.dims},
         "map": {"y": excerpt.map_dims[0], "x": excerpt.map_dims[1]},
         "layers": [
-            {
-                "name": name,
-                "title": table[name].attrs["long_name"],
-                "short": LAYERS.get(name),
-                "scale": scale_of(name),
-            }
+            {"name": name, "title": table[name].attrs["long_name"]}
+            | {"short": LAYERS.get(name), "scale": scale_of(name)}
             for name in (*excerpt.layers, *(["valueless_share"] if "valueless_share" in table else []))
         ],
         "arrays": arrays,
