@@ -106,7 +106,9 @@ def test_hazard_of_samples_has_a_table_for_each_frequency(capsys: pytest.Capture
     (tmp_path / "a.toml").write_text(axes + uncertain)
     result = str(tmp_path / "a.nc")
     told(capsys, "run", str(tmp_path / "a.toml"), "-o", result)
-    out = told(capsys, "hazard", result, "--curve", str(tmp_path / "curve.csv"), "-d", "1cm")
+    figure = tmp_path / "rates.png"
+    out = told(capsys, "hazard", result, "--curve", str(tmp_path / "curve.csv"), "-d", "1cm", "-o", str(figure))
+    assert figure.exists()
     for frequency in (1, 2):
         assert f"theta = 5, frequency = {frequency}\n" in out
     assert out.count("annual rate") == 2

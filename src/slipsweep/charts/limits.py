@@ -113,7 +113,7 @@ def hazard(result: Result, options: Options) -> Figure:
     dotted where more than half of the rate is held above the largest amplitude.
     """
     rates = result.data
-    grid = {str(dim): size for dim, size in rates["valueless_share"].sizes.items()}
+    grid = {str(dim): size for dim, size in rates["annual_rate"].sizes.items() if dim != "threshold"}
     points = [zip(grid, at, strict=True) for at in np.ndindex(*grid.values())]
     names = [", ".join(member_text(rates, dim, at, options) for dim, at in point) for point in points]
     if len(names) > _MOST_CURVES:
