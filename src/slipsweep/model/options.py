@@ -174,18 +174,16 @@ def friction_inputs(model: str, given: Collection[str], drawn: Mapping[str, str]
     drawn = drawn or {}
     if "yield_coefficient" in drawn or "yield_coefficient" in given:
         return "Üy drawn" if "yield_coefficient" in drawn else "Üy given"
-    known, uncertain, estimated = [], [], []
+    parts: dict[str, list[str]] = {" given": [], " drawn": [], ": estimated": []}
     for name, (symbol, rule) in _INPUTS.items():
         if model == "newmark" and name != "yield_acceleration":
             continue
         if name in drawn and (name in given or drawn[name] == "absolute"):
-            uncertain.append(symbol)
+            parts[" drawn"].append(symbol)
         elif name in given:
-            known.append(symbol)
+            parts[" given"].append(symbol)
         else:
-            with_minimum = ", μmin given" if name == "decay_rate" and "minimum_friction" in given else ""
-            about = ", drawn about it" if name in drawn else ""
-            detail = (with_minimum + about).removeprefix(", ")
-            estimated.append(f"{symbol} {rule}" + (f" ({detail})" if detail else ""))
-    parts = ((known, " given"), (uncertain, " drawn"), (estimated, ": estimated"))
-    return "; ".join(", ".join(names) + what for names, what in parts if names)
+            notes = ["μmin given"] if name == "decay_rate" and "minimum_friction" in given else []
+            notes += ["drawn about it"] if name in drawn else []
+            parts[": estimated"].append(f"{symbol} {rule}" + (f" ({', '.join(notes)})" if notes else ""))
+    return "; ".join(", ".join(names) + what for what, names in parts.items() if names)
