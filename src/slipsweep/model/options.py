@@ -146,16 +146,10 @@ _INPUTS = {
 
 
 def friction_inputs(model: str, given: Collection[str], drawn: Mapping[str, str] | None = None) -> str:
-    """Say where Üy, λ and Δμ of a result come from: given, drawn, or estimated; Newmark's block has only Üy.
+    """Where Üy, λ and Δμ of a result come from, such as 'Üy, λ given; Δμ by Eqs. 10–11: estimated'.
 
     `drawn` has uncertain parameters, and whether a draw is the value ("absolute") or one about it ("factor", "offset").
-
-    Examples
-    --------
-    >>> friction_inputs("mendez", ())
-    'Üy by Coulomb, λ by Eq. 6, Δμ by Eqs. 10–11: estimated'
-    >>> friction_inputs("mendez", ("yield_acceleration", "decay_rate"))
-    'Üy, λ given; Δμ by Eqs. 10–11: estimated'
+    Newmark's block has only Üy.
     """
     drawn = drawn or {}
     if "yield_coefficient" in drawn or "yield_coefficient" in given:

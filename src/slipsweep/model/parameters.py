@@ -29,8 +29,7 @@ LARGEST = 1e30
 GRAVITY = 9.81
 
 #: More than any shaking has, or any accuracy needs; the kernels count in 64 bits.
-MOST_CYCLES = 1_000_000_000
-MOST_POINTS = 1_000_000_000
+MOST_CYCLES = MOST_POINTS = 1_000_000_000
 
 #: Longest ramp in cycles, each of which has pieces of its own.
 MOST_RAMP = 100
@@ -171,11 +170,6 @@ def friction_coefficient(phi: Any) -> Any:
 
     It lies along the dimensions of a DataArray or Variable, or along the dimension "phi"; but for a Variable it has the
     angles as its coordinate "phi".  InputError: angles that are not allowed, or dimensions that have no name.
-
-    Examples
-    --------
-    >>> friction_coefficient([20.0, 45.0]).values.round(3).tolist()
-    [0.364, 1.0]
     """
     import numpy as np
     import xarray as xr
