@@ -62,14 +62,6 @@ def test_pieces_are_the_wave(name: str) -> None:
         assert np.all(found * (one.first + one.last) > 0), f"piece {p}: changes its sign"
 
 
-def test_intervals_are_the_same_up_to_the_next() -> None:
-    """Of plain cycles; the last before a ramp that begins in its negative half wave differs from them."""
-    assert wave_of(Square(cycles=5, ramp_out=1.25)).same.tolist() == [0, 0, 2, 3]
-    assert wave_of(Sine(cycles=5)).same.tolist() == [0, 0]
-    # the first interval has begun before the shaking, and the last ends with it
-    assert wave_of(Cosine(cycles=5)).same.tolist() == [0, 1, 1, 1, 4]
-
-
 @each
 def test_pieces_join(name: str) -> None:
     """No phase is left out, and w jumps only where it is said to, upwards, or down."""

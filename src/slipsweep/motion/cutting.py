@@ -195,8 +195,7 @@ def wave_of(waveform: Waveform) -> Wave:
         arc=np.repeat([_is_sine(waveform) and not own for own in ramped], counts),
     )
     shape = [1 + n if own else 0 for n, own in enumerate(ramped)]
-    wave = wave_of_pieces(table, np.cumsum([0, *counts]), shape, lead, repeats)
-    return wave._replace(same=_same(wave), rises=_rises(table))
+    return wave_of_pieces(table, np.cumsum([0, *counts]), shape, lead, repeats)._replace(rises=_rises(table))
 
 
 def _is_sine(waveform: Waveform) -> bool:
@@ -204,15 +203,6 @@ def _is_sine(waveform: Waveform) -> bool:
     if isinstance(waveform, Harmonics):
         return [m for a, m in zip(waveform.amplitudes, waveform.multiples, strict=True) if a != 0.0] == [1]
     return waveform.name in ("sine", "cosine")
-
-
-def _same(wave: Wave) -> NDArray[np.int64]:
-    """`Wave.same`: pieces may come at other times."""
-    shapes = wave.pieces.copy()
-    shapes["start"] = shapes["end"] = 0.0
-    ways = itertools.pairwise([*wave.interval[:, 0], len(shapes)])
-    first: dict[bytes, int] = {}
-    return np.array([first.setdefault(shapes[p:q].tobytes(), k) for k, (p, q) in enumerate(ways)], np.int64)
 
 
 def _rises(pieces: np.ndarray) -> NDArray[np.float64]:
