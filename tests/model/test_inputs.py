@@ -92,22 +92,6 @@ def test_coordinates_and_dimensions_named_like_a_result(function: str) -> None:
             call(function, theta=theta)
 
 
-@pytest.mark.parametrize(
-    ("changed", "message"),
-    [
-        ({"theta": xr.DataArray([1.0, 2.0], dims="mu_s")}, "mu_s: is a dimension of another parameter"),
-        (
-            {"theta": xr.DataArray([1.0], dims="case"), "mu_s": xr.DataArray(0.4, coords={"case": 1})},
-            "mu_s: its coordinate 'case' has the name of a dimension",
-        ),
-        ({"theta": xr.Variable(("x", "x"), np.ones((2, 2)))}, "theta: dimensions x, x: must be named each once"),
-    ],
-)
-def test_names_that_no_dataset_can_have(changed: dict[str, Any], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        call("sweep", **changed)
-
-
 # -------------------------------------------------------------------------- other arguments
 
 REFUSED: list[tuple[str, dict[str, Any], str]] = [
@@ -126,6 +110,14 @@ REFUSED: list[tuple[str, dict[str, Any], str]] = [
     ("sample", {"correlation": 5}, "correlation = 5: must be a list"),
     ("sample", {"correlation": [["mu_s", ["theta"], 0.1]]}, r"correlation = \['theta'\]: must be one of"),
     ("sweep of a record", {"polarity": {1}}, r"polarity = \{1\}: must be 1, -1"),
+    # names that no dataset can have
+    ("sweep", {"theta": xr.DataArray([1.0, 2.0], dims="mu_s")}, "mu_s: is a dimension of another parameter"),
+    (
+        "sweep",
+        {"theta": xr.DataArray([1.0], dims="case"), "mu_s": xr.DataArray(0.4, coords={"case": 1})},
+        "mu_s: its coordinate 'case' has the name of a dimension",
+    ),
+    ("sweep", {"theta": xr.Variable(("x", "x"), np.ones((2, 2)))}, "theta: dimensions x, x: must be named each once"),
 ]
 
 

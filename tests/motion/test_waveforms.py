@@ -5,11 +5,12 @@ from math import pi
 
 import numpy as np
 import pytest
-from mpmath import mp, mpf
+from mpmath import mp, mpf, workdps
 
 from slipsweep import Cosine, Cycle, Harmonics, Sine, Square, Step, Triangle, sweep
 from slipsweep.motion.cutting import wave_of
 from slipsweep.motion.waveforms import Waveform
+from tests.support import sections
 
 CYCLES = 4
 RICH = Harmonics([1.0, 0.6, 0.35, 0.2], [1, 2, 5, 50], [0.0, 40.0, 100.0, 7.0], cycles=CYCLES)
@@ -27,42 +28,20 @@ EVERY: dict[str, Waveform] = {
 each = pytest.mark.parametrize("name", EVERY)
 
 
-def terms_of(waveform: Harmonics) -> list[tuple[float, int, float]]:
-    """Amplitude, multiple and phase of each harmonic."""
-    assert waveform.phases is not None
-    return list(zip(waveform.amplitudes, waveform.multiples, waveform.phases, strict=True))
-
-
-def defined(waveform: Waveform, phase: np.ndarray) -> np.ndarray:
-    """w by its definition; harmonics not normalised."""
-    turns = phase / (2 * pi)
-    if isinstance(waveform, Harmonics):
-        w = sum((a * np.sin(m * phase + np.radians(p)) for a, m, p in terms_of(waveform)), np.zeros(phase.shape))
-    else:
-        w = {
-            "sine": np.sin(phase),
-            "cosine": np.cos(phase),
-            "triangle": 2 / pi * np.arcsin(np.sin(phase)),
-            "square": np.where(turns % 1 < 0.5, 1.0, -1.0),
-        }[waveform.name]
-    rise = turns / waveform.ramp_in if waveform.ramp_in else 1.0
-    fall = (waveform.cycles - turns) / waveform.ramp_out if waveform.ramp_out else 1.0
-    return w * np.minimum(1.0, np.minimum(rise, fall))
-
-
-def exact_peak(waveform: Harmonics) -> float:
-    """The largest magnitude of the sum of harmonics: mpmath's root of its derivative beside a fine grid's best."""
-    terms = terms_of(waveform)
-
-    def total(phase: mpf) -> mpf:
-        return mp.fsum(mpf(a) * mp.sin(m * phase + mp.radians(p)) for a, m, p in terms)
-
-    def slope(phase: mpf) -> mpf:
-        return mp.fsum(mpf(a) * m * mp.cos(m * phase + mp.radians(p)) for a, m, p in terms)
-
-    grid = np.linspace(0, 2 * pi, 200_001)
-    values = sum(a * np.sin(m * grid + np.radians(p)) for a, m, p in terms)
-    return float(abs(total(mp.findroot(slope, grid[np.abs(values).argmax()]))))
+def exact(waveform: Waveform, phase: np.ndarray) -> np.ndarray:
+    """w in multiple precision, by the reference's own sections of a cycle."""
+    terms = ""
+    if isinstance(waveform, Harmonics) and waveform.phases:
+        columns = zip(waveform.amplitudes, waveform.multiples, waveform.phases, strict=True)
+        terms = ",".join(f"{a!r}:{m}:{p!r}" for a, m, p in columns)
+    reference = sections.Waveform(waveform.name, terms, waveform.cycles, waveform.ramp_in, waveform.ramp_out)
+    with workdps(30):
+        numbers, values = (phase // (2 * pi)).astype(int).tolist(), []
+        cycles = {n: list(reference.sections(n, mpf(1))) for n in {*numbers}}
+        for n, phi in zip(numbers, phase.tolist(), strict=True):
+            own = phi - 2 * mp.pi * n
+            values.append(float(next(one for one in cycles[n] if own <= one.end).ground(own)))
+    return np.array(values)
 
 
 @each
@@ -70,28 +49,17 @@ def test_pieces_are_the_wave(name: str) -> None:
     """1e-14 and the rounding of mφ, monotone and of one sign; harmonics of fifty times the frequency included."""
     waveform = EVERY[name]
     wave = wave_of(waveform)
-    scale, fastest = 1.0, 1
-    if isinstance(waveform, Harmonics):
-        scale, fastest = exact_peak(waveform), max(waveform.multiples)
-    for p in range(len(wave.pieces)):
-        tau = wave.pieces[p].begin + np.linspace(0.01, 0.99, 23) * (wave.pieces[p].finish - wave.pieces[p].begin)
-        phase = wave.pieces[p].start + (tau - wave.pieces[p].begin)
+    fastest = max(waveform.multiples) if isinstance(waveform, Harmonics) else 1
+    for p, one in enumerate(wave.pieces):
+        tau = one.begin + np.linspace(0.01, 0.99, 23) * (one.finish - one.begin)
+        phase = one.start + (tau - one.begin)
         if wave.repeats and p >= wave.cycle[wave.lead + 1]:
             phase += 2 * pi * (wave.repeats - 1)  # the table has the plain cycle once
-        powers = [*wave.pieces[p].coefficients[: wave.pieces[p].degree][::-1], wave.pieces[p].top]
-        found = np.polyval(powers, tau)
-        error = np.abs(found - defined(waveform, phase) / scale).max()
+        found = np.polyval([*one.coefficients[: one.degree][::-1], one.top], tau)
+        error = np.abs(found - exact(waveform, phase)).max()
         assert error < 1e-14 + 4e-16 * fastest * 8 * pi, f"piece {p}: off by {error:.1e}"
-        assert np.all(np.diff(found) * (wave.pieces[p].last - wave.pieces[p].first) >= 0), f"piece {p}: not monotone"
-        assert np.all(found * (wave.pieces[p].first + wave.pieces[p].last) > 0), f"piece {p}: changes its sign"
-
-
-def test_intervals_are_the_same_up_to_the_next() -> None:
-    """Of plain cycles; the last before a ramp that begins in its negative half wave differs from them."""
-    assert wave_of(Square(cycles=5, ramp_out=1.25)).same.tolist() == [0, 0, 2, 3]
-    assert wave_of(Sine(cycles=5)).same.tolist() == [0, 0]
-    # the first interval has begun before the shaking, and the last ends with it
-    assert wave_of(Cosine(cycles=5)).same.tolist() == [0, 1, 1, 1, 4]
+        assert np.all(np.diff(found) * (one.last - one.first) >= 0), f"piece {p}: not monotone"
+        assert np.all(found * (one.first + one.last) > 0), f"piece {p}: changes its sign"
 
 
 @each
@@ -101,12 +69,11 @@ def test_pieces_join(name: str) -> None:
     assert wave.pieces[0].start == 0.0
     np.testing.assert_array_equal(wave.pieces["start"][1:], wave.pieces["end"][:-1])
     assert wave.pieces[-1].end == pytest.approx(2 * pi * (wave.cycle.size - 1), rel=1e-15)
-    leaps = wave.pieces["first"] - np.concatenate([[0.0], wave.pieces["last"][:-1]])
+    before = np.concatenate([[0.0], wave.pieces["last"][:-1]])
+    leaps = wave.pieces["first"] - before
     if EVERY[name].name != "square":
         assert not leaps[1:].any(), "a jump in a continuous wave"
-    np.testing.assert_array_equal(
-        wave.pieces["jumps"], leaps > np.maximum(0.0, -np.concatenate([[0.0], wave.pieces["last"][:-1]]))
-    )
+    np.testing.assert_array_equal(wave.pieces["jumps"], leaps > np.maximum(0.0, -before))
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -115,15 +82,13 @@ def test_peak_is_exact(seed: int) -> None:
     draw = np.random.default_rng(seed)
     count = int(draw.integers(2, 7))
     multiples = draw.choice(np.arange(1, 51), count, replace=False)
-    waveform = Harmonics(
-        draw.normal(size=count).tolist(), multiples.tolist(), draw.uniform(0, 360, count).tolist(), cycles=1
-    )
-    wave = wave_of(waveform)
-    assert np.abs(wave.pieces["top"]).max() == 1.0
-    # scaled by the peak, the coefficients give it back
-    p = int(np.abs(wave.pieces["top"]).argmax())
-    phase = wave.pieces[p].start if wave.pieces[p].begin == 0.0 else wave.pieces[p].end
-    assert abs(defined(waveform, np.array([phase]))[0]) == pytest.approx(exact_peak(waveform), rel=1e-13)
+    amplitudes, phases = draw.normal(size=count).tolist(), draw.uniform(0, 360, count).tolist()
+    waveform = Harmonics(amplitudes, multiples.tolist(), phases, cycles=1)
+    pieces = wave_of(waveform).pieces
+    assert np.abs(pieces["top"]).max() == 1.0
+    highest = pieces[np.abs(pieces["top"]).argmax()]
+    phase = highest.start if highest.begin == 0.0 else highest.end
+    assert np.abs(exact(waveform, np.array([phase]))) == pytest.approx(1.0, rel=1e-13)
 
 
 #: sin 2φ and sin 3φ that nearly cancel about φ = π: three zeros within 0.026 rad, the wave below 1e-5 between them.
@@ -146,11 +111,13 @@ def test_zeros_that_lie_close_together_are_told_apart(power: int) -> None:
 def test_friction_turns_at_each_zero() -> None:
     """Continuous sliding over three close zeros, against Gauss's rule between them; all solvers share the pieces."""
     theta, mu_s, amplitude, frequency, onset, decay = 0.0, 0.33292316, 8.9043785, 1.3944814, 1.8758496, 31.182287
-    g, peak = 9.81, exact_peak(THREE_ZEROS)
+    g = 9.81
     at_rest = mu_s * amplitude / (onset + g * mu_s)  # Eqs. 7, 8 and 10 on the level plane
+    a, b = THREE_ZEROS.amplitudes
+    scale = amplitude * exact(THREE_ZEROS, np.array([1.0]))[0] / (a * np.sin(2.0) + b * np.sin(3.0))
 
     def shaking(phase: np.ndarray) -> np.ndarray:
-        return amplitude / peak * (0.2536777542789753 * np.sin(2 * phase) + 0.1692128468453051 * np.sin(3 * phase))
+        return scale * (a * np.sin(2 * phase) + b * np.sin(3 * phase))
 
     def rate(phase: np.ndarray) -> np.ndarray:
         ground = shaking(phase)

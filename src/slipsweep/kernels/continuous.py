@@ -116,5 +116,5 @@ _slide = series_of(_follow_cycle)
 def slide_continuously(block: Block, options: Options, wave: Wave, workspace: Workspace) -> Pulse:
     """Continuous sliding from the first Üg ≥ Üy on, as one pulse."""
     if not find_zeros(block, options.wants_peak, wave, workspace):
-        return Pulse(math.nan, math.nan, math.nan, 0.0, 0.0, 0.0, 0)
+        return Pulse(math.nan, math.nan, math.nan, 0.0, 0.0, 0)
     return _slide(block, options, wave, workspace)

@@ -47,21 +47,20 @@ class Workspace(NamedTuple):
 
     `log` has one row for each part of a pulse if a history is requested, else none, and `logged`, (1,), is how many
     are in use; `zeros`, (2, MOST_STAGES), is for zeros of D on either side of Üg = 0, and `zero_counts`, (2,), for how
-    many there are (`continuous`); `known` is for pulses that come again (`train`).
+    many there are (`continuous`).
     """
 
     log: np.ndarray
     logged: np.ndarray
     zeros: np.ndarray
     zero_counts: np.ndarray
-    known: np.ndarray
 
 
 class State(NamedTuple):
     """The block in a pulse: V, W since its beginning, its acceleration b (`held`), and whether it slides.
 
-    While it slides b is constant, or as last taken from Eq. 4.  Besides: the largest and the least V, the phase at
-    which it last came to rest, slides that began from rest, and the rows of the log.
+    While it slides b is constant, or as last taken from Eq. 4.  Besides: the largest and the least V, slides that
+    began from rest, and the rows of the log.
     """
 
     velocity: float
@@ -70,7 +69,6 @@ class State(NamedTuple):
     sliding: bool
     peak: float
     least: float
-    shaken_until: float
     slips: float
     logged: int
 
@@ -103,7 +101,6 @@ def workspace_of(wave: Wave, keeps_log: bool = False) -> Workspace:
         logged=np.zeros(1, np.int64),
         zeros=np.empty((2, MOST_STAGES)),
         zero_counts=np.zeros(2, np.int64),
-        known=np.empty((wave.height.size, 2)),
     )
 
 
@@ -112,7 +109,7 @@ def uncounted_workspace(workspace: Workspace) -> Workspace:
     """The same workspace (`decorators.uncounted`)."""
     return Workspace(
         uncounted(workspace.log), uncounted(workspace.logged), uncounted(workspace.zeros),
-        uncounted(workspace.zero_counts), uncounted(workspace.known),
+        uncounted(workspace.zero_counts),
     )  # fmt: skip
 
 
@@ -120,18 +117,14 @@ def uncounted_workspace(workspace: Workspace) -> Workspace:
 def with_held(state: State, held: float) -> State:
     """The state with another b."""
     return State(
-        state.velocity, state.displacement, held, state.sliding, state.peak, state.least, state.shaken_until,
-        state.slips, state.logged,
-    )  # fmt: skip
+        state.velocity, state.displacement, held, state.sliding, state.peak, state.least, state.slips, state.logged
+    )
 
 
 @scalar
 def begun(state: State, held: float) -> State:
     """The state of a block at rest that begins to slide (t1)."""
-    return State(
-        0.0, state.displacement, held, True, state.peak, state.least, state.shaken_until, state.slips + 1.0,
-        state.logged,
-    )  # fmt: skip
+    return State(0.0, state.displacement, held, True, state.peak, state.least, state.slips + 1.0, state.logged)
 
 
 @scalar
@@ -139,16 +132,15 @@ def state_after(
     state: State, part: Part, kind: int, pieces: np.ndarray, p: int, start: float, log: np.ndarray
 ) -> State:  # fmt: skip
     """The state after a part of a slide along piece p from τ = `start` on; the log has it, if one is kept."""
-    stop = phase_at(pieces[p], part.end) if part.stops or log.size else 0.0
     logged = state.logged
     if log.size:
-        velocity, displacement = state.velocity, state.displacement
-        note(log[logged], kind, p, start, phase_at(pieces[p], start), stop, state.held, velocity, displacement)
+        begins, ends = phase_at(pieces[p], start), phase_at(pieces[p], part.end)
+        note(log[logged], kind, p, start, begins, ends, state.held, state.velocity, state.displacement)
         logged += 1
     return State(
         part.velocity, state.displacement + part.displacement, state.held, not part.stops,
         np.maximum(part.peak, state.peak), min(part.least, state.least),  # NaN is kept
-        stop if part.stops else state.shaken_until, state.slips, logged,
+        state.slips, logged,
     )  # fmt: skip
 
 
@@ -396,7 +388,7 @@ def rise(
         state = with_held(state, physics.response(block, x) if stage.follows else state.held)
         if x >= top:
             return state
-    return State(math.nan, math.nan, state.held, True, math.nan, math.nan, 0.0, state.slips, state.logged)
+    return State(math.nan, math.nan, state.held, True, math.nan, math.nan, state.slips, state.logged)
 
 
 @scalar
@@ -441,14 +433,13 @@ def recouple(
     """
     count = pieces.shape[0]
     started = pieces[q].start if q < count else pieces[q - 1].end
-    shaken_until = started  # Eq. 12 goes on beyond the shaking just the same
     if recoupling == physics.INTEGRATE:
         while state.sliding and q < min(p + 1, count):
             end = tau if q == p else pieces[q].finish
             if end > pieces[q].begin:
                 state = hold_on(pieces, q, block.amplitude, pieces[q].begin, end, state, log)
             q += 1
-        started, shaken_until = pieces[count - 1].end, math.inf
+        started = pieces[count - 1].end
     if not state.sliding or (p < count and recoupling == physics.INTEGRATE):
         return state
     duration = math.inf if p >= count else phase_at(pieces[p], tau) - started
@@ -460,9 +451,8 @@ def recouple(
     velocity = eq.attenuated_velocity(state.velocity, state.held, duration)
     displacement = state.displacement + eq.attenuated_displacement(state.velocity, state.held, duration)
     return State(
-        velocity, displacement, state.held, state.sliding, state.peak, min(state.least, velocity), shaken_until,
-        state.slips, logged,
-    )  # fmt: skip
+        velocity, displacement, state.held, state.sliding, state.peak, min(state.least, velocity), state.slips, logged
+    )
 
 
 @single
@@ -483,7 +473,6 @@ def pulse(
         sliding=velocity > 0.0,
         peak=velocity,
         least=velocity,
-        shaken_until=0.0,
         slips=0.0,
         logged=0,
     )
@@ -508,14 +497,12 @@ def pulse(
         x, tau = block.amplitude * pieces[min(q, end - 1)].first, pieces[min(q, end - 1)].begin
     if state.sliding:
         if state.held <= 0.0:
-            return Pulse(0.0, math.nan, math.nan, 0.0, 0.0, state.slips, physics.KD_NOT_POSITIVE)
+            return Pulse(0.0, math.nan, math.nan, 0.0, state.slips, physics.KD_NOT_POSITIVE)
         next_p, next_tau = pieces.shape[0], 0.0
         if following < wave.height.size:
             next_p, next_tau = beginning(block, wave, following)
         state = recouple(block, options.recoupling, pieces, end, next_p, next_tau, state, log)
     workspace.logged[0] = state.logged
     validity = physics.KD_NOT_POSITIVE if least_held <= 0.0 else 0
-    return Pulse(
-        state.velocity, state.displacement, state.peak, min(state.least, state.velocity), state.shaken_until,
-        state.slips, validity,
-    )  # fmt: skip
+    least = min(state.least, state.velocity)
+    return Pulse(state.velocity, state.displacement, state.peak, least, state.slips, validity)

@@ -32,16 +32,13 @@ _INTERVALS = 32
 class Pulse(NamedTuple):
     """From one Üg = Üy to the next: V at its end, W gained, the largest and the least V, slides begun from rest.
 
-    `shaken_until` is the phase from which on the shaking plays no part in it: the stop, or a bound on it; t5 if Eq. 12
-    follows; infinite if only the end of the shaking brought the block to rest.  `validity` says if there is no value:
-    b ≤ 0 at the end of any of its rises (NaN, if at the end of the last).
+    `validity` says if there is no value: b ≤ 0 at the end of any of its rises (NaN, if at the end of the last).
     """
 
     velocity: float
     displacement: float
     peak: float
     least: float
-    shaken_until: float
     slips: float
     validity: int
 

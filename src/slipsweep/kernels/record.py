@@ -102,7 +102,7 @@ def continuous_pulse(
     p, tau = pulses.beginning(block, wave, k)
     until = end_of_following(block, wave, k, following)
     if not find_zeros(block, options.wants_peak, wave, workspace):
-        return pulses.Pulse(math.nan, math.nan, math.nan, 0.0, 0.0, 0.0, 0)
+        return pulses.Pulse(math.nan, math.nan, math.nan, 0.0, 0.0, 0)
     gained, displaced, most = follow_eq4(block, wave, workspace, p, tau, until.piece, until.tau)
     after = velocity + gained
     displacement = velocity * (until.ends - phase_at(wave.pieces[p], tau)) + displaced
@@ -116,7 +116,7 @@ def continuous_pulse(
         displacement += side * eq.attenuated_displacement(speed, held, until.begins - until.ends)
         after = side * eq.attenuated_velocity(speed, held, until.begins - until.ends)
     slips = 1.0 if velocity == 0.0 else 0.0
-    return pulses.Pulse(after, displacement, velocity + most, 0.0, 0.0, slips, 0)
+    return pulses.Pulse(after, displacement, velocity + most, 0.0, slips, 0)
 
 
 @inlined

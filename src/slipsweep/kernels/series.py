@@ -52,6 +52,6 @@ def series_of(
             peak = max(peak, max(velocity, velocity + later * whole.velocity) + whole.peak)
             displacement += repeats * (whole.displacement + math.pi * (2.0 * velocity + whole.velocity * later))
             velocity += repeats * whole.velocity
-        return Pulse(velocity, displacement, peak, 0.0, 0.0, 0.0, 0)
+        return Pulse(velocity, displacement, peak, 0.0, 0.0, 0)
 
     return slide_continuously

@@ -351,8 +351,8 @@ def pulse(
             validity = physics.KD_NOT_POSITIVE if state.sliding and state.held <= 0.0 else validity
             state = walk(block, pieces, steps, q, begin, pieces[q].finish, HELD, state)
     if state.sliding and state.held <= 0.0:
-        return pulses.Pulse(0.0, math.nan, math.nan, 0.0, 0.0, 0.0, physics.KD_NOT_POSITIVE)
-    started = shaken_until = pieces[end - 1].end  # t5: Üg = 0
+        return pulses.Pulse(0.0, math.nan, math.nan, 0.0, 0.0, physics.KD_NOT_POSITIVE)
+    started = pieces[end - 1].end  # t5: Üg = 0
     next_p, next_tau, begins = pieces.shape[0], 0.0, math.inf
     if following < wave.height.size:
         next_p, next_tau = pulses.beginning(block, wave, following)
@@ -362,12 +362,11 @@ def pulse(
             if state.sliding:
                 until = next_tau if q == next_p else pieces[q].finish
                 state = walk(block, pieces, steps, q, pieces[q].begin, until, HELD, state)
-                shaken_until = math.inf if state.sliding else pieces[q].end
     velocity, displacement = state.velocity, state.displacement
     if state.sliding and (options.recoupling != physics.INTEGRATE or begins == math.inf):
         displacement += eq.attenuated_displacement(velocity, state.held, begins - started)
         velocity = eq.attenuated_velocity(velocity, state.held, begins - started)
-    return pulses.Pulse(velocity, displacement, state.peak, min(state.least, velocity), shaken_until, 0.0, validity)
+    return pulses.Pulse(velocity, displacement, state.peak, min(state.least, velocity), 0.0, validity)
 
 
 @scalar

@@ -8,8 +8,6 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from slipsweep.jit.decorators import scalar, single
 from slipsweep.kernels.block import (
     NO_VALUE,
@@ -29,19 +27,6 @@ from slipsweep.model.friction import FrictionLaw
 from slipsweep.motion.pieces import Wave
 
 
-@scalar
-def keep(wave: Wave, k: int, now: Pulse, known: np.ndarray) -> None:
-    """Keep W and the largest V of a pulse entered at rest for all intervals that are the `same`.
-
-    If the shaking plays no part in it from the next interval on: up to there these intervals have the same pieces.
-    `known` is (intervals, 2); W is NaN where none is kept.
-    """
-    last = wave.pieces.shape[0] - 1
-    until = wave.pieces[wave.interval[k + 1, 0]].start if k + 1 < wave.height.size else wave.pieces[last].end
-    if now.velocity == 0.0 and now.validity == 0 and now.shaken_until <= until:
-        known[wave.same[k], 0], known[wave.same[k], 1] = now.displacement, now.peak
-
-
 def train_of(
     pulse: Callable[[Block, Options, Wave, Any, int, int, float], Pulse],
 ) -> Callable[[Block, Options, Wave, Any], Pulse]:
@@ -53,19 +38,13 @@ def train_of(
 
     @scalar
     def pulses(
-        block: Block, options: Options, wave: Wave, workspace: Any, k: int, until: int, velocity: float,
-        known: np.ndarray,
-    ) -> tuple[Pulse, int]:  # fmt: skip
+        block: Block, options: Options, wave: Wave, workspace: Any, k: int, until: int, velocity: float
+    ) -> tuple[Pulse, int]:
         """Pulses from interval k on, as long as they begin before piece `until`, as one; the next one's interval."""
         displacement, peak, least, validity = 0.0, velocity, velocity, 0
         while k < wave.height.size and wave.interval[k, 0] < until:
             following = first_pulse(block, wave, k + 1)
-            same = wave.same[k]
-            now = Pulse(0.0, known[same, 0], known[same, 1], 0.0, 0.0, 0.0, 0)
-            if velocity > 0.0 or math.isnan(now.displacement):
-                now = pulse(block, options, wave, workspace, k, following, velocity)
-                if velocity == 0.0:
-                    keep(wave, k, now, known)
+            now = pulse(block, options, wave, workspace, k, following, velocity)
             k, velocity = following, now.velocity
             displacement += now.displacement
             peak, least = max(peak, now.peak), min(least, now.least)
@@ -76,7 +55,7 @@ def train_of(
                 validity |= UNSOLVED
             if validity & NO_VALUE:
                 break
-        return Pulse(velocity, displacement, peak, least, 0.0, 0.0, validity), k
+        return Pulse(velocity, displacement, peak, least, 0.0, validity), k
 
     @single
     def train(block: Block, options: Options, wave: Wave, workspace: Any) -> Pulse:
@@ -86,10 +65,8 @@ def train_of(
         repeat; where the block never rests within it, the velocity changes by the same amount
         each time and W is an arithmetic series.
         """
-        known = workspace.known
-        known[:, 0] = math.nan
         k = first_pulse(block, wave, 0)
-        now, k = pulses(block, options, wave, workspace, k, wave.cycle[wave.lead], 0.0, known)
+        now, k = pulses(block, options, wave, workspace, k, wave.cycle[wave.lead], 0.0)
         velocity, displacement, peak, validity = now.velocity, now.displacement, now.peak, now.validity
         # what the cycles before the repeated one (a ramp, say) leave is the first velocity to come back to
         seen_velocity, seen_displacement, seen_at, next_look = velocity, displacement, 0, 1
@@ -97,7 +74,7 @@ def train_of(
         after = k
         while left > 0 and validity & NO_VALUE == 0:
             before = velocity
-            now, after = pulses(block, options, wave, workspace, k, wave.cycle[wave.lead + 1], before, known)
+            now, after = pulses(block, options, wave, workspace, k, wave.cycle[wave.lead + 1], before)
             validity |= now.validity
             if validity & NO_VALUE:
                 break
@@ -129,13 +106,13 @@ def train_of(
                 seen_velocity, seen_displacement, seen_at = velocity, displacement, done
                 next_look *= 2
         if validity & NO_VALUE == 0:
-            now, _ = pulses(block, options, wave, workspace, after, wave.pieces.shape[0], velocity, known)
+            now, _ = pulses(block, options, wave, workspace, after, wave.pieces.shape[0], velocity)
             validity |= now.validity
             displacement += now.displacement
             peak = max(peak, now.peak)
         if validity & NO_VALUE:
             displacement = peak = math.nan
-        return Pulse(velocity, displacement, peak, 0.0, 0.0, 0.0, validity)
+        return Pulse(velocity, displacement, peak, 0.0, 0.0, validity)
 
     return train
 
@@ -154,7 +131,7 @@ def cell_solver_of(
         interface = interface_of(cell, options.rise, options.g)
         block, mode = block_of(law, cell.amplitude, cell, interface, options), interface.sliding_mode
         validity, unknown = validity_before(interface.validity, block, wave), math.nan if mode < 0 else 0.0
-        found = Pulse(0.0, unknown, unknown, 0.0, 0.0, 0.0, 0)
+        found = Pulse(0.0, unknown, unknown, 0.0, 0.0, 0)
         if mode == eq.CONTINUOUS:
             found = slide_continuously(block, options, wave, workspace)
         elif mode == eq.STICK_SLIP and block.amplitude * wave.highest > block.yield_acceleration:

@@ -17,33 +17,19 @@ from slipsweep.model import equations as eq
 
 
 class FrictionLaw(NamedTuple):
-    """What the kernels need of a friction law: jitted functions of numbers.
+    """What the kernels need of a friction law: jitted functions of the numbers behind them.
 
     μs, Δμ and λ are the parameters of every law (`mu_s`, `delta_mu`, `decay_rate`); what λ means is the law's own.
-
-    Attributes
-    ----------
-    friction : callable
-        ``friction(ground_acceleration, mu_s, delta_mu, decay_rate, g)``: μ at Üg of either sign.
-    derivatives : callable, optional
-        ``derivatives(friction, decay_rate, g)``: dμ/d|Üg| and d²μ/d|Üg|², where the law gives `friction`.
-    inflection : callable, optional
-        ``inflection(tan_theta, decay_rate, g)``: Üg up to which Ü of Eq. 4 is concave; it is convex beyond.
-    static_acceleration : callable, optional
-        ``static_acceleration(mu_s, delta_mu, decay_rate, g)``: |Üg| at which μ is μs.
-    moments : callable, optional
-        ``moments(start, change, mu_s, delta_mu, decay_rate, g)``: ∫ μ times 1, 1 − w, w and w (1 − w) over w from
-        0 to 1, where |Üg| = start + w change.
-    decay_length : callable, optional
-        ``decay_length(decay_rate, g)``: the change of |Üg| over which μ falls to a part 1/e, or less.
     """
 
-    friction: Callable[..., float]
-    derivatives: Any = None
-    inflection: Any = None
-    static_acceleration: Any = None
+    friction: Callable[..., float]  # (ground_acceleration, mu_s, delta_mu, decay_rate, g): μ at Üg of either sign
+    derivatives: Any = None  # (friction, decay_rate, g): dμ/d|Üg| and d²μ/d|Üg|², where the law gives `friction`
+    inflection: Any = None  # (tan_theta, decay_rate, g): Üg up to which Ü of Eq. 4 is concave; it is convex beyond
+    static_acceleration: Any = None  # (mu_s, delta_mu, decay_rate, g): |Üg| at which μ is μs
+    #: (start, change, mu_s, delta_mu, decay_rate, g): ∫ μ times 1, 1 − w, w and w (1 − w) over w from 0 to 1, where
+    #: |Üg| = start + w change
     moments: Any = None
-    decay_length: Any = None
+    decay_length: Any = None  # (decay_rate, g): the change of |Üg| over which μ falls to a part 1/e, or less
 
     @property
     def missing(self) -> tuple[str, ...]:

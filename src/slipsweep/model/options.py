@@ -13,7 +13,7 @@ Rule: TypeAlias = Literal["rectangle", "trapezoid", "simpson"]
 
 @dataclass(frozen=True)
 class Mendez(Choice):
-    """The friction law of Mendez, Romo and Botero (2012), Eqs. 1-12 of the paper [1]_.
+    """The friction law of Mendez, Romo and Botero (2012), Eqs. 1-12 of the paper, which `sweep` cites.
 
     Parameters
     ----------
@@ -34,12 +34,6 @@ class Mendez(Choice):
     --------
     Newmark : the classical block, whose friction does not decay
 
-    References
-    ----------
-    .. [1] B. C. Mendez, M. P. Romo and E. Botero (2012), "Linearization of rigid body dynamics on frictional interfaces
-       under harmonic loading", Soil Dynamics and Earthquake Engineering 32, 152-158,
-       https://doi.org/10.1016/j.soildyn.2011.08.007
-
     Examples
     --------
     >>> import slipsweep
@@ -59,15 +53,7 @@ class Mendez(Choice):
 class Newmark(Choice):
     """Newmark's rigid block [1]_: its acceleration is Üy while it slides, and the base's while it does not.
 
-    Parameters
-    ----------
-    g : float
-        Gravity, m/s².
-
-    Raises
-    ------
-    InputError
-        A value that is not allowed.
+    Its gravity `g` is that of `Mendez`.
 
     See Also
     --------
@@ -160,32 +146,24 @@ _INPUTS = {
 
 
 def friction_inputs(model: str, given: Collection[str], drawn: Mapping[str, str] | None = None) -> str:
-    """Say where Üy, λ and Δμ of a result come from: given, drawn, or estimated; Newmark's block has only Üy.
+    """Where Üy, λ and Δμ of a result come from, such as 'Üy, λ given; Δμ by Eqs. 10–11: estimated'.
 
     `drawn` has uncertain parameters, and whether a draw is the value ("absolute") or one about it ("factor", "offset").
-
-    Examples
-    --------
-    >>> friction_inputs("mendez", ())
-    'Üy by Coulomb, λ by Eq. 6, Δμ by Eqs. 10–11: estimated'
-    >>> friction_inputs("mendez", ("yield_acceleration", "decay_rate"))
-    'Üy, λ given; Δμ by Eqs. 10–11: estimated'
+    Newmark's block has only Üy.
     """
     drawn = drawn or {}
     if "yield_coefficient" in drawn or "yield_coefficient" in given:
         return "Üy drawn" if "yield_coefficient" in drawn else "Üy given"
-    known, uncertain, estimated = [], [], []
+    parts: dict[str, list[str]] = {" given": [], " drawn": [], ": estimated": []}
     for name, (symbol, rule) in _INPUTS.items():
         if model == "newmark" and name != "yield_acceleration":
             continue
         if name in drawn and (name in given or drawn[name] == "absolute"):
-            uncertain.append(symbol)
+            parts[" drawn"].append(symbol)
         elif name in given:
-            known.append(symbol)
+            parts[" given"].append(symbol)
         else:
-            with_minimum = ", μmin given" if name == "decay_rate" and "minimum_friction" in given else ""
-            about = ", drawn about it" if name in drawn else ""
-            detail = (with_minimum + about).removeprefix(", ")
-            estimated.append(f"{symbol} {rule}" + (f" ({detail})" if detail else ""))
-    parts = ((known, " given"), (uncertain, " drawn"), (estimated, ": estimated"))
-    return "; ".join(", ".join(names) + what for names, what in parts if names)
+            notes = ["μmin given"] if name == "decay_rate" and "minimum_friction" in given else []
+            notes += ["drawn about it"] if name in drawn else []
+            parts[": estimated"].append(f"{symbol} {rule}" + (f" ({', '.join(notes)})" if notes else ""))
+    return "; ".join(", ".join(names) + what for what, names in parts.items() if names)

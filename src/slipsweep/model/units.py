@@ -54,12 +54,6 @@ def without_unit(key: str, own: str, values: Any, g: float) -> Any:
     """What brings a unit, a pint Quantity or an array of xarray with the attribute `units`, in the unit `own`.
 
     Other values are returned as they are; "g" is `g` m/s².  InputError: its unit does not convert.
-
-    Examples
-    --------
-    >>> import pint
-    >>> without_unit("amplitude", "m s-2", pint.Quantity(0.5, "standard_gravity"), 9.81)
-    4.903325
     """
     data = getattr(values, "data", values) if hasattr(values, "dims") else values
     if hasattr(data, "magnitude") and hasattr(data, "units"):

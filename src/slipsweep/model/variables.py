@@ -149,15 +149,14 @@ def _cf(units: str, long_name: str, ancillary: str | None = None, **more: str) -
     return about | ({"ancillary_variables": ancillary} if ancillary else {}) | more
 
 
-def _coded(long_name: str, codes: type[IntEnum], ancillary: str | None = None) -> dict[str, Any]:
+def _coded(
+    long_name: str, codes: type[IntEnum] | type[IntFlag], ancillary: str | None = None, key: str = "flag_values"
+) -> dict[str, Any]:
     """CF attributes of a variable of codes; one below 0 is that of a missing value."""
     known = [code for code in codes if code >= 0]
-    return {
-        "long_name": long_name,
-        "flag_values": [int(code) for code in known],
-        "flag_meanings": " ".join(code.name.lower() for code in known),
-        **({"ancillary_variables": ancillary} if ancillary else {}),
-    }
+    meanings = " ".join((code.name or "").lower() for code in known)
+    about = {"long_name": long_name, key: [int(code) for code in known], "flag_meanings": meanings}
+    return about | ({"ancillary_variables": ancillary} if ancillary else {})
 
 
 #: Which way u is measured.
@@ -202,22 +201,14 @@ RECORD_INPUTS = ("amplitude", "scale", "pgv", "arias_intensity", "time_scale", "
 STRENGTHS = ("amplitude", "scale", "pgv", "arias_intensity")
 
 #: Inputs that may be drawn: all that the displacement depends on.
-DRAWN = (
-    "theta", "mu_s", "phi", "amplitude", "displacement_amplitude", "frequency",
-    "yield_acceleration", "yield_coefficient", "decay_rate", "delta_mu", "minimum_friction", "scale", "pgv",
-    "arias_intensity", "time_scale",
-)  # fmt: skip
+DRAWN = tuple(name for name in PARAMETERS if name not in ("structure_frequency", "polarity", "azimuth"))
 
 #: Results of a sweep: attributes of the variables.
 RESULTS: dict[str, dict[str, Any]] = {
     "permanent_displacement": _cf("m", "permanent displacement, downslope", "validity", comment=_DIRECTION),
     "peak_relative_velocity": _cf("m s-1", "largest downslope relative velocity", "validity"),
     "sliding_mode": _coded("sliding mode", SlidingMode, "validity"),
-    "validity": {
-        "long_name": "validity flags; 0 = no flag raised",
-        "flag_masks": [int(flag) for flag in Validity],
-        "flag_meanings": " ".join((flag.name or "").lower() for flag in Validity),
-    },
+    "validity": _coded("validity flags; 0 = no flag raised", Validity, key="flag_masks"),
     "newmark_displacement": _cf(
         "m", "permanent displacement of Newmark's block, downslope", "validity", comment=_DIRECTION
     ),
@@ -297,12 +288,7 @@ STATISTIC_COORDINATES: dict[str, dict[str, Any]] = {
     "quantile": _cf("1", "share of the samples with a value that lies below"),
     "threshold": _cf("m", "displacement to exceed"),
     "mode": {"units": "1", **_coded("sliding mode", SlidingMode)},
-    "flag": {
-        "units": "1",
-        "long_name": "flag of the validity",
-        "flag_values": [int(flag) for flag in Validity],
-        "flag_meanings": RESULTS["validity"]["flag_meanings"],
-    },
+    "flag": {"units": "1", **_coded("flag of the validity", Validity)},
     "input": {"long_name": "uncertain input; inputs that are correlated are one, with + between them"},
     "bound": _cf("1", "probability below an end of an interval"),
 }

@@ -1,10 +1,8 @@
-"""A waveform, or a record, cut into the pieces that the solvers go through.
+"""A waveform, or a record, cut into the pieces that the solvers go through (`pieces.Wave`); they are of no cell.
 
-`wave_of` and `wave_of_record` give a `pieces.Wave`: the shaking cut where w jumps, bends, turns and passes 0, so that w
-is monotone, smooth and of one sign on each piece (and further where a smooth one would be too long for its polynomial).
-`kernels.excitation` evaluates, integrates and inverts a piece.  Pieces do not depend on the cell.  From the end of a
-piece to the beginning of the next w may jump; before the first piece and after the last the base is at rest.  Pulses
-happen in the intervals with w > 0 whose height exceeds Üy/A.
+The shaking is cut where w jumps, bends, turns and passes 0, so that w is monotone, smooth and of one sign on each piece
+(and further where a smooth one would be too long for its polynomial).  From the end of a piece to the beginning of the
+next w may jump; before the first piece and after the last the base is at rest.
 """
 
 import bisect
@@ -30,12 +28,10 @@ TERMS = 22
 #: Points of a cycle closer than this, as parts of it, are one; so are values of w closer than the second.
 _SAME, _ROUNDING = 1e-12, 1e-15
 
-#: Intervals, for each period of the fastest harmonic, in which zeros and turns are looked for, and how many further
-#: derivatives part them by their zeros: four zeros in one interval have one of the last between them.
-_INTERVALS, _DEPTH = 12, 3
-
-#: Halvings of such an interval until nothing is left of it.
-_HALVINGS = 54
+#: Intervals, for each period of the fastest harmonic, in which zeros and turns are looked for, how many further
+#: derivatives part them by their zeros (four zeros in one interval have one of the last between them), and halvings
+#: of such an interval until nothing is left of it.
+_INTERVALS, _DEPTH, _HALVINGS = 12, 3, 54
 
 # 80-bit numbers where the machine has them: coefficients then are right to the last digit
 _Extended = np.longdouble
@@ -128,24 +124,23 @@ def _pieces(waveform: Waveform, n: int) -> tuple[Exact, ...]:
             places.append(place)
     found = []
     for low, high in itertools.pairwise(sorted(places)):
-        scale, rate = _Extended(1), _Extended(0)  # the ramp at `low`, and its slope by phase
+        wave = derivatives[bisect.bisect(breaks, low) - 1]
         if n + 0.5 * (low + high) < rise:
-            scale, rate = (n + _Extended(low)) / rise, 1 / (rise * _TURN)
+            wave = _ramped(wave, low, (n + _Extended(low)) / rise, 1 / (rise * _TURN))
         elif left - 0.5 * (low + high) < fall:
-            scale, rate = (left - _Extended(low)) / fall, -1 / (fall * _TURN)
-        plain = derivatives[bisect.bisect(breaks, low) - 1]
-        found.append(_monotone_pieces(_ramped(plain, low, scale, rate), fastest, low, high))
+            wave = _ramped(wave, low, (left - _Extended(low)) / fall, -1 / (fall * _TURN))
+        found.append(_monotone_pieces(wave, fastest, low, high))
     return tuple(map(np.concatenate, zip(*found, strict=True)))
 
 
 def _ramped(plain: Derivative, low: float, scale: Any, rate: Any) -> Derivative:
-    """A wave times its ramp, a straight line: `scale` at `low`, and of slope `rate`."""
+    """A wave times its ramp, a straight line: `scale` at `low`, and of slope `rate` by phase."""
 
     def derivative(u: Exact, order: int) -> Exact:
         ramp = scale + rate * (np.asarray(u, _Extended) - low) * _TURN
         return np.asarray(ramp * plain(u, order) + order * rate * plain(u, order - 1))
 
-    return derivative if rate else plain
+    return derivative
 
 
 def _monotone_pieces(derivative: Derivative, fastest: int, low: float, high: float) -> tuple[Exact, ...]:
@@ -200,8 +195,7 @@ def wave_of(waveform: Waveform) -> Wave:
         arc=np.repeat([_is_sine(waveform) and not own for own in ramped], counts),
     )
     shape = [1 + n if own else 0 for n, own in enumerate(ramped)]
-    wave = wave_of_pieces(table, np.cumsum([0, *counts]), shape, lead, repeats)
-    return wave._replace(same=_same(wave), rises=_rises(table))
+    return wave_of_pieces(table, np.cumsum([0, *counts]), shape, lead, repeats)._replace(rises=_rises(table))
 
 
 def _is_sine(waveform: Waveform) -> bool:
@@ -209,15 +203,6 @@ def _is_sine(waveform: Waveform) -> bool:
     if isinstance(waveform, Harmonics):
         return [m for a, m in zip(waveform.amplitudes, waveform.multiples, strict=True) if a != 0.0] == [1]
     return waveform.name in ("sine", "cosine")
-
-
-def _same(wave: Wave) -> NDArray[np.int64]:
-    """`Wave.same`: pieces may come at other times."""
-    shapes = wave.pieces.copy()
-    shapes["start"] = shapes["end"] = 0.0
-    ways = itertools.pairwise([*wave.interval[:, 0], len(shapes)])
-    first: dict[bytes, int] = {}
-    return np.array([first.setdefault(shapes[p:q].tobytes(), k) for k, (p, q) in enumerate(ways)], np.int64)
 
 
 def _rises(pieces: np.ndarray) -> NDArray[np.float64]:

@@ -195,12 +195,9 @@ def _cosmos_channel(path: Path, lines: list[str], at: int) -> Samples | None:
     def section(what: str, pattern: str) -> tuple[int, Floats]:
         """The line after the values of a section, and these."""
         count, each, width = (int(number or 1) for number in head(what, pattern))
-        end, width = at + 1 + -(-count // (each or 1)), width or 1
-
-        def cells(line: str) -> list[str]:
-            return [line[i : i + width] for i in range(0, len(line.rstrip()), width)]
-
-        values = _numbers(path, enumerate(lines[at + 1 : end], at + 2), cells, f"numbers, {width} columns each")
+        end, column = at + 1 + -(-count // (each or 1)), f".{{1,{width or 1}}}"
+        rows, numbers = enumerate(lines[at + 1 : end], at + 2), f"numbers, {width or 1} columns each"
+        values = _numbers(path, rows, lambda line: re.findall(column, line.rstrip()), numbers)
         if values.size != count:
             raise InputError(f"{path}: line {end}: {values.size} values, where {count} are announced")
         return end, values

@@ -6,10 +6,8 @@ Findings are texts, with the time and the value; no text is no finding.
 import numpy as np
 from numpy.typing import NDArray
 
-from slipsweep.motion.intensity import Motion, peak_displacement, peak_velocity
+from slipsweep.motion.intensity import Floats, Motion, peak_displacement, peak_velocity
 from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS
-
-Floats = NDArray[np.float64]
 
 #: An interval of more median ones than this is a gap.  Of fewer samples than the second, typed by hand, nothing is said
 #: but of values that cannot be.

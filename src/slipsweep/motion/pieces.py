@@ -47,7 +47,6 @@ class Wave(NamedTuple):
     shape: np.ndarray  # (cycles,) cycles of one number have the same pieces
     interval: np.ndarray  # (intervals, 2) its first piece, and the first after it
     height: np.ndarray  # (intervals,) its largest w
-    same: np.ndarray  # (intervals,) the first interval of the same pieces, those up to the next interval among them
     rises: np.ndarray  # (ranges, 2) ranges of w > 0 passed through, or jumped to, without falling; they do not overlap
     highest: float  # w
     lowest: float
@@ -88,8 +87,8 @@ def pieces_of(
 def wave_of_pieces(pieces: np.ndarray, cycle: ArrayLike, shape: ArrayLike, lead: int = 0, repeats: int = 0) -> Wave:
     """The wave of a table of pieces.
 
-    Its intervals are runs of pieces above zero; one that touches zero ends.  `same` and `rises` are those of cycles
-    that do not repeat: what they save is not worth their computation there.
+    Its intervals are runs of pieces above zero; one that touches zero ends.  `rises` is left empty: a record has no use
+    for it.
     """
     first, last = pieces["first"], pieces["last"]
     above = np.concatenate([[False], first + last > 0.0, [False]])
@@ -104,7 +103,6 @@ def wave_of_pieces(pieces: np.ndarray, cycle: ArrayLike, shape: ArrayLike, lead:
         shape=np.asarray(shape, np.int64),
         interval=interval,
         height=np.maximum.reduceat(np.append(top, 0.0), interval.ravel())[::2].copy() if interval.size else np.empty(0),
-        same=np.arange(len(interval)),
         rises=np.empty((0, 2)),
         highest=float(top.max()),
         lowest=float(np.minimum(first, last).min()),
@@ -129,7 +127,6 @@ class Steps(NamedTuple):
     at: np.ndarray
     w: np.ndarray  # −0.0 where a negative piece is 0: Eq. 4 jumps there
     rates: np.ndarray  # workspace of `kernels.step`: Üg − Ü by Eq. 4 at the values of w on a piece
-    known: np.ndarray  # workspace of `kernels.train`
 
 
 def steps_of(wave: Wave, rule: int, steps_per_cycle: int) -> Steps:
@@ -147,10 +144,9 @@ def steps_of(wave: Wave, rule: int, steps_per_cycle: int) -> Steps:
     w += pieces["top"][p]
     w[at], w[at + 2 * counts] = pieces["first"], pieces["last"]
     w = np.copysign(np.maximum(np.copysign(1.0, pieces["top"][p]) * w, 0.0), pieces["top"][p])
-    rates, known = np.empty(2 * int(counts.max()) + 1), np.empty((wave.height.size, 2))
-    return Steps(rule, steps_per_cycle, counts, at, w, rates, known)
+    return Steps(rule, steps_per_cycle, counts, at, w, np.empty(2 * int(counts.max()) + 1))
 
 
 def own_steps(steps: Steps) -> Steps:
-    """The same steps with workspaces of their own, for another thread."""
-    return steps._replace(rates=np.empty_like(steps.rates), known=np.empty_like(steps.known))
+    """The same steps with a workspace of their own, for another thread."""
+    return steps._replace(rates=np.empty_like(steps.rates))

@@ -7,16 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from slipsweep.errors import InputError
 from slipsweep.model.parameters import LARGEST, check_choice, check_numbers, check_single, shown
 from slipsweep.motion import formats
 from slipsweep.motion.inspection import drift, odd_peak, without_fill_values
-from slipsweep.motion.intensity import peak_velocity
+from slipsweep.motion.intensity import Floats, peak_velocity
 from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS, Baseline, Format, Gaps, Implausible, Reading, Unit
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,8 +1,6 @@
 """Tests on a shaking table: what was measured over time, read with names and units from the header.
 
-A test has a row of times, the acceleration of the table, and any of the block's acceleration, its relative
-velocity and its relative displacement.  Sampling may be unequal.  A blank cell, or NaN, is a sample that one
-channel does not have.  Nothing is taken off a channel here but what is asked for (`ShakingTest.corrected`).
+Nothing is taken off a channel here but what is asked for (`ShakingTest.corrected`).
 """
 
 import hashlib
@@ -12,17 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.model.parameters import check_choice, check_finite, check_list, check_numbers, shown
 from slipsweep.model.units import conversion
 from slipsweep.model.variables import HISTORY
-from slipsweep.motion.formats import read_columns, read_lines
+from slipsweep.motion.formats import Floats, read_columns, read_lines
 from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS
 from slipsweep.motion.records import check_samples
-
-Floats = NDArray[np.float64]
 
 #: What is measured of the table, and what the block may be measured by.
 TABLE, RESPONSES = "ground_acceleration", ("block_acceleration", "relative_velocity", "relative_displacement")
@@ -64,11 +59,10 @@ class ShakingTest:
         times = check_numbers(f"{self.name}: time", self.times)
         own = [name for name in CHANNELS if name in self.channels]
         kept = {name: check_numbers(f"{self.name}: {name}", self.channels[name]) for name in own}
-        blank = {name: np.isnan(values) & (name != TABLE) for name, values in kept.items()}
-        filled = {name: np.where(blank[name], 0.0, values) for name, values in kept.items()}
+        filled = {name: np.where(np.isnan(values) & (name != TABLE), 0.0, values) for name, values in kept.items()}
         check_samples(self.name, times, filled, FEWEST_SAMPLES)
-        for name, missing in blank.items():
-            if missing.all():
+        for name, values in kept.items():
+            if np.isnan(values).all():
                 raise InputError(f"{self.name}: {name}: no sample")
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "channels", kept)
@@ -119,11 +113,11 @@ def check_channels(key: str, given: Any, known: Collection[str]) -> tuple[str, .
 
 def removed_text(removed: Mapping[str, tuple[float, float]]) -> list[str]:
     """What was taken off each channel, a line each."""
-    units = {name: HISTORY[name]["units"] for name in CHANNELS}
-    return [
-        f"{name}: {constant:.4g} {units[name]}" + (f" and {slope:.4g} {units[name]} a second" if slope else "")
-        for name, (constant, slope) in removed.items()
-    ]
+    texts = []
+    for name, (constant, slope) in removed.items():
+        unit = HISTORY[name]["units"]
+        texts.append(f"{name}: {constant:.4g} {unit}" + (f" and {slope:.4g} {unit} a second" if slope else ""))
+    return texts
 
 
 def read_test(path: str | Path) -> ShakingTest:

@@ -15,11 +15,9 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.model.parameters import check_list, check_single, shown
 from slipsweep.model.variables import INTENSITY_MEASURES
-from slipsweep.motion.intensity import intensity_measures
+from slipsweep.motion.intensity import Floats, intensity_measures
 from slipsweep.motion.reading import Baseline, Format, Gaps, Implausible, Reading, Unit
 from slipsweep.motion.records import Record, read_record
-
-Floats = NDArray[np.float64]
 
 #: Samples of the two components of a pair are at one time if they are nearer than this part of an interval.
 _SAME_TIME = 1e-6
@@ -354,9 +352,8 @@ def _matching(folder: Path, entry: str | Path) -> list[Path]:
     found = (folder / one for one in glob.iglob(pattern, root_dir=folder, recursive=True))
     files = sorted(one for one in found if one.is_file())
     if not files:
-        raise InputError(
-            f"paths: {entry}: {'a folder without files' if path.is_dir() else 'no file fits this pattern'}"
-        )
+        what = "a folder without files" if path.is_dir() else "no file fits this pattern"
+        raise InputError(f"paths: {entry}: {what}")
     return files
 
 

@@ -8,17 +8,14 @@ the first `ramp_in` cycles, and falls to 0 over the last `ramp_out`; A is the pe
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Self, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from slipsweep.errors import InputError
 from slipsweep.model.choices import Choice, Family, option
 from slipsweep.model.parameters import MOST_CYCLES, number_text
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
-
-Floats: TypeAlias = "NDArray[np.float64]"
 
 #: Largest multiple of a harmonic.
 MOST_MULTIPLE = 100
@@ -211,7 +208,7 @@ WAVEFORMS: Family[Waveform] = Family(
 )
 
 
-def peak_acceleration(displacement_amplitude: Floats, frequency: Floats) -> Floats:
+def peak_acceleration(displacement_amplitude: "NDArray[Any]", frequency: "NDArray[Any]") -> "NDArray[Any]":
     """A = (2πf)² d of a motion of peak displacement d (m), m/s²; the arrays broadcast."""
     omega = 2.0 * math.pi * frequency
     return omega * omega * displacement_amplitude
