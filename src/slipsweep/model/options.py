@@ -13,7 +13,7 @@ Rule: TypeAlias = Literal["rectangle", "trapezoid", "simpson"]
 
 @dataclass(frozen=True)
 class Mendez(Choice):
-    """The friction law of Mendez, Romo and Botero (2012), Eqs. 1-12 of the paper, which `sweep` cites.
+    """The friction law of Mendez, Romo and Botero (2012), Eqs. 1-12 of the paper [1]_.
 
     Parameters
     ----------
@@ -34,6 +34,12 @@ class Mendez(Choice):
     --------
     Newmark : the classical block, whose friction does not decay
 
+    References
+    ----------
+    .. [1] B. C. Mendez, M. P. Romo and E. Botero (2012), "Linearization of rigid body dynamics on frictional interfaces
+       under harmonic loading", Soil Dynamics and Earthquake Engineering 32, 152-158,
+       https://doi.org/10.1016/j.soildyn.2011.08.007
+
     Examples
     --------
     >>> import slipsweep
@@ -53,7 +59,15 @@ class Mendez(Choice):
 class Newmark(Choice):
     """Newmark's rigid block [1]_: its acceleration is Üy while it slides, and the base's while it does not.
 
-    Its gravity `g` is that of `Mendez`.
+    Parameters
+    ----------
+    g : float
+        Gravity, m/s².
+
+    Raises
+    ------
+    InputError
+        A value that is not allowed.
 
     See Also
     --------

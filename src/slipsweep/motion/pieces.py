@@ -7,7 +7,6 @@ import math
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.polynomial.polynomial import polyval
 from numpy.typing import ArrayLike, NDArray
 
 #: A piece: a record of the fields of `piece_type`.
@@ -23,11 +22,10 @@ def piece_type(terms: int) -> np.dtype[Any]:
     `start` and `end` are phases of the motion, `begin` and `finish` the same as τ (one of the two is 0); `first`,
     `last` and `top` are w at the beginning, the end and the anchor.  The `degree` is 0 on a plateau and 1 on a straight
     line; a piece `jumps` if w jumps up at its beginning, and is an `arc` if it is a quarter of a sine about its peak,
-    whose closed forms are shorter than its series.  `whole` and `whole_moment` are ∫ (w − top) dτ and
-    ∫ (end − τ)(w − top) dτ over the piece; c₁, c₂, … are `coefficients`, and `once` and `twice` those of the sum's
-    first and second integral from the anchor, of τ² and τ³ on.
+    whose closed forms are shorter than its series.  c₁, c₂, … are `coefficients`, and `once` and `twice` those of the
+    sum's first and second integral from the anchor, of τ² and τ³ on.
     """
-    numbers = ("start", "end", "begin", "finish", "first", "last", "top", "whole", "whole_moment")
+    numbers = ("start", "end", "begin", "finish", "first", "last", "top")
     fields: list[Any] = [(name, np.float64) for name in numbers]
     fields += [("degree", np.int64), ("jumps", np.bool_), ("arc", np.bool_)]
     fields += [(name, np.float64, (terms,)) for name in ("coefficients", "once", "twice")]
@@ -75,12 +73,6 @@ def pieces_of(
     pieces["coefficients"] = coefficients
     pieces["once"] = coefficients / (power + 1)
     pieces["twice"] = coefficients / ((power + 1) * (power + 2))
-    tau = np.where(at_end, -length, length)  # of the end that is not the anchor
-    with np.errstate(over="ignore", invalid="ignore"):  # what overflows here, overflows where it is used
-        once = polyval(tau, pieces["once"].T, tensor=False) * tau * tau
-        moment = polyval(tau, pieces["twice"].T, tensor=False) * tau * tau * tau
-        pieces["whole"] = np.where(at_end, -once, once)
-        pieces["whole_moment"] = np.where(at_end, -moment - once * length, moment)
     return pieces
 
 
