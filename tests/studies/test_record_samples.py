@@ -1,6 +1,5 @@
 """Uncertain inputs under a record: against sweeps of the draws one by one, and in sweep files."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,9 +8,8 @@ import xarray as xr
 
 from slipsweep import InputError, Record, Suite, sample, sweep
 from slipsweep.model.variables import Validity
-from slipsweep.studies.sampling import Sampling
+from tests.studies.test_uncertainty import sampling_of
 
-SYNTHETIC = Path(__file__).parents[2] / "sweeps" / "data" / "synthetic.csv"
 SAMPLES = 64
 THRESHOLDS = (0.001, 0.02)
 
@@ -27,10 +25,8 @@ def shaking() -> Record:
 
 def drawn(uncertain: dict[str, Any]) -> dict[str, xr.DataArray]:
     """The draws along a dimension."""
-    sampling = Sampling(
-        uncertain, samples=SAMPLES, method="sobol", seed=0, quantiles=[0.5], thresholds=[0.1], correlation=(), g=9.81
-    )
-    return {name: xr.DataArray(values, dims="draw") for name, values in sampling.draws.items()}
+    draws = sampling_of(uncertain, samples=SAMPLES).draws
+    return {name: xr.DataArray(values, dims="draw") for name, values in draws.items()}
 
 
 NORMAL = {"distribution": "norm", "loc": 0.45, "scale": 0.04}

@@ -34,17 +34,13 @@ def test_each_motion_does_what_it_does_alone(model: str, strength: str) -> None:
     given: dict[str, Any] = {strength: np.array([0.3, 0.9]) * {"amplitude": 6.0, "scale": 2.0}.get(strength, 1.0)}
     given |= {"time_scale": [1, 2.5], "polarity": "both", "model": model, "variables": tuple(RECORD_RESULTS)}
     found = sweep([0, 5], [0.1, 0.3], excitation=SUITE, **given)
-    assert found.permanent_displacement.dims == ("theta", "mu_s", *_order(strength), "polarity", "motion")
+    assert found.permanent_displacement.dims == ("theta", "mu_s", strength, "time_scale", "polarity", "motion")
     assert found.motion.values.tolist() == ["noise1", "noise2", "noise3"]
     assert float(found.permanent_displacement.max()) > 0.0
     for at, motion in enumerate(MOTIONS):
         alone = sweep([0, 5], [0.1, 0.3], excitation=motion, **given)
         for name in RECORD_RESULTS:
             np.testing.assert_array_equal(found[name].isel(motion=at), alone[name], err_msg=name)
-
-
-def _order(strength: str) -> tuple[str, str]:
-    return strength, "time_scale"
 
 
 def test_the_factor_of_each_motion_makes_the_strength() -> None:

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.model import options, parameters, variables
@@ -13,9 +12,7 @@ from slipsweep.motion.shaking import RESPONSES, TABLE
 from slipsweep.studies import findings, friction
 from slipsweep.studies.estimate import Estimate, cycle_estimate, estimate
 from slipsweep.studies.likelihood import SOUGHT, Observation
-from slipsweep.studies.table_motion import runs_of
-
-Floats = NDArray[np.float64]
+from slipsweep.studies.table_motion import Floats, runs_of
 
 #: Part of the largest acceleration that a pulse has at least to be a cycle, and fewest samples of one.
 _A_CYCLE, _FEWEST_IN_A_CYCLE = 0.1, 12
@@ -44,16 +41,13 @@ def calibrate(
         As for `measured_friction`, but of the block any one or more of `block_acceleration` (m/s²), `relative_velocity`
         (m/s) and `relative_displacement` (m), downslope positive; NaN or a blank cell where there is no sample.
         Several tests of one interface are calibrated together.
-    theta, mu_s : float
-        Inclination of the plane, degrees, and static friction coefficient, measured by other means.
-    phi : float, optional
-        Friction angle, degrees, instead of mu_s = tan phi.
+    theta, mu_s, phi : float
+        Inclination of the plane, degrees, and static friction coefficient, or its angle, degrees: mu_s = tan phi.
     model : Mendez or str
         The rules of motion.
     offset, drift : str or list of str
         Channels, `ground_acceleration` among them, whose sensor has an offset, or an offset and a drift in a straight
-        line; "all" for all.  These are fitted together with the parameters; what was found stands in the attribute
-        `removed`.
+        line; "all" for all.  They are fitted together with the parameters; the attribute `removed` has what was found.
     noise : mapping of str to float, optional
         Standard deviation of the noise of channels; by default estimated from the residuals.
     cycles : bool
@@ -193,7 +187,7 @@ def _cycles(one: Observation, found: Estimate) -> xr.Dataset:
         inside = (times >= begin) & (times < end)
         if inside.sum() < _FEWEST_IN_A_CYCLE:
             continue
-        values, errors = cycle_estimate(one.cycle(begin, end, speed), found, (1, 2) if continuous else (0, 1, 2))
+        values, errors = cycle_estimate(one.cycle(begin, end, speed), found, [1, 2] if continuous else [0, 1, 2])
         for name, value, error in zip(SOUGHT, values, errors, strict=True):
             data[f"cycle_{name}"][row], data[f"cycle_{name}_error"][row] = value, error
         history = one.forward(np.where(np.isfinite(values), values, found.parameters), times)

@@ -5,15 +5,13 @@ from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from slipsweep.model.variables import Validity
 from slipsweep.motion.shaking import TABLE, ShakingTest
 from slipsweep.studies.estimate import Estimate
 from slipsweep.studies.friction import coefficients_of, onset_acceleration, slides_of, threshold_of
 from slipsweep.studies.likelihood import SOUGHT, Observation
-
-Floats = NDArray[np.float64]
+from slipsweep.studies.table_motion import Floats
 
 #: Symbols and units of what is sought.
 _SYMBOL, _UNIT = ("Üy", "λ", "Δμ"), (" m/s2", "", "")
@@ -44,7 +42,7 @@ def report(
     constant = next((one for one in statics if one.attrs["constant_friction"]), None)
     sentence = "" if constant is None else constant.attrs["constant_friction"]
     slides = bool((results["permanent_displacement"] != 0.0).any())
-    said = [] if sentence else _misfit(found, drifting)
+    said = [sentence] if sentence else _misfit(found, drifting)
     failed = bool(said)
     for one in found.observations:
         first, most = float(one.motion.acceleration[0]), float(np.abs(one.motion.acceleration).max())
@@ -68,7 +66,6 @@ def report(
     if (results["validity"] & Validity.NOT_RECOUPLED).any():
         said.append("The computed block does not come to rest before the next slide begins (flag not_recoupled).")
     if constant is not None:
-        said.insert(0, sentence)
         tables = _newmark_tables(found.observations[0], constant)
     elif found.determined.all() and slides and not failed and not contradictions:
         tables = _model_table(found), _uncertainty_table(found)
@@ -116,11 +113,8 @@ def _misfit(found: Estimate, drifting: Sequence[str]) -> list[str]:
         f"The misfit is larger than the noise of the sensors: {listed}. The block did not move as in the model, or a "
         "sensor drifts: do not use the parameters before you know why (see the figure)."
     )
-    drifts = [
-        f"With an offset and a drift of {name} taken out, the misfit is that of the sensors' noise: give "
-        f"drift = {name!r}."
-        for name in drifting
-    ]
+    explained = "taken out, the misfit is that of the sensors' noise: give drift ="
+    drifts = [f"With an offset and a drift of {name} {explained} {name!r}." for name in drifting]
     return [text, *drifts] if listed else []
 
 
@@ -151,10 +145,10 @@ def _undetermined(found: Estimate) -> list[str]:
     """Which parameters the tests do not determine, why, and which measurement would."""
     tests = "these tests" if len(found.observations) > 1 else "this test"
     missing = [at for at in range(3) if not found.determined[at]]
-    names = [_SYMBOL[at] for at in missing]
-    listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+    *others, last = (_SYMBOL[at] for at in missing)
+    listed, are = (f"{', '.join(others)} and {last}", "are") if others else (last, "is")
     ranges = "; ".join(f"{_SYMBOL[at]} {_range(found.intervals[at], at)}" for at in missing)
-    said = [f"{listed} {'is' if len(names) == 1 else 'are'} not determined by {tests}: {ranges}."]
+    said = [f"{listed} {are} not determined by {tests}: {ranges}."]
     yields = "held" in found.readings and not math.isfinite(found.intervals[1][1])
     crosses = bool({"crossed", "crossing"} & found.readings)
     if yields and crosses:
@@ -228,14 +222,15 @@ def _uncertainty_table(found: Estimate) -> str:
         pairs = [f'["{SOUGHT[i]}", "{SOUGHT[j]}", {rounded[i, j]:.4f}]' for i, j in ((0, 1), (0, 2), (1, 2))]
         lines.append(f"correlation = [{', '.join(pairs)}]")
     for name, value, error in zip(SOUGHT, found.parameters, found.errors, strict=True):
-        lines += ["", f"[uncertainty.{name}]", *_normal(value, error)]
+        lines += _normal(name, value, error)
     return "\n".join(lines) + "\n"
 
 
-def _normal(value: float, error: float) -> list[str]:
+def _normal(name: str, value: float, error: float) -> list[str]:
     low = math.ceil(-1e4 * value / error) / 1e4
     cut = ['distribution = "truncnorm"', f"a = {low + 0.0:.4f}", "b = 8.0"]
-    return [*(cut if low > -6.0 else ['distribution = "norm"']), f"loc = {_number(value)}", f"scale = {error:.4g}"]
+    kind = cut if low > -6.0 else ['distribution = "norm"']
+    return ["", f"[uncertainty.{name}]", *kind, f"loc = {_number(value)}", f"scale = {error:.4g}"]
 
 
 def _newmark_tables(one: Observation, coefficients: xr.Dataset) -> tuple[str, str]:
@@ -249,8 +244,8 @@ def _newmark_tables(one: Observation, coefficients: xr.Dataset) -> tuple[str, st
         f'[model]\nfriction = "newmark"\nyield_acceleration = {_number(value)}  # 95 %: {low:.4g} to {high:.4g} m/s2\n'
         f"g = {one.model.g:g}\n"
     )
-    lines = _normal(value, max((high - low) / 3.92, 1e-6 * value))
-    return model, "\n".join(["[uncertainty]", "", "[uncertainty.yield_acceleration]", *lines]) + "\n"
+    lines = _normal("yield_acceleration", value, max((high - low) / 3.92, 1e-6 * value))
+    return model, "\n".join(["[uncertainty]", *lines]) + "\n"
 
 
 def sweep_file_text(model_table: str, uncertainty_table: str) -> str:
@@ -258,9 +253,8 @@ def sweep_file_text(model_table: str, uncertainty_table: str) -> str:
     if not uncertainty_table:
         return model_table
     drawn = tuple(f"{name} = " for name in SOUGHT if f"[uncertainty.{name}]" in uncertainty_table)
-    lines = [
-        f"# {line}; without [uncertainty]" if line.startswith(drawn) else line for line in model_table.splitlines()
-    ]
+    lines = model_table.splitlines()
+    lines = [f"# {line}; without [uncertainty]" if line.startswith(drawn) else line for line in lines]
     return "\n".join(lines) + "\n\n" + uncertainty_table
 
 

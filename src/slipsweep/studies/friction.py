@@ -24,9 +24,7 @@ from slipsweep.errors import InputError
 from slipsweep.model.parameters import check_finite, check_numbers, check_single, shown, single_friction_coefficient
 from slipsweep.model.variables import HISTORY, MEASURED_FRICTION, PARAMETERS, REFERENCE, SLIDES
 from slipsweep.motion.shaking import CHANNELS, TABLE, ShakingTest, read_test, removed_text, unit_factor
-from slipsweep.studies.table_motion import noise_of
-
-Floats = NDArray[np.float64]
+from slipsweep.studies.table_motion import Floats, noise_of
 
 #: What a caller may give as a test.
 Test = str | Path | ShakingTest | xr.Dataset | Mapping[str, xr.DataArray]
@@ -193,18 +191,15 @@ def measured_friction(
         A CSV file whose header names columns and units: ``time (s), table acceleration (g), block acceleration
         (m/s2)``; or a Dataset along `time` (s) with `ground_acceleration` (the table's) and `block_acceleration`,
         in m/s² or in the unit of their attribute `units`.  Samples need not be evenly spaced.
-    theta, mu_s : float
-        Inclination of the plane, degrees, and static friction coefficient.
-    phi : float, optional
-        Friction angle, degrees, instead of mu_s = tan phi.
+    theta, mu_s, phi : float
+        Inclination of the plane, degrees, and static friction coefficient, or its angle, degrees: mu_s = tan phi.
     g : float
         Gravity, m/s².
     offset, drift : str or list of str
-        Channels to take a constant, or a straight line, off; "all" for all.  What was taken off stands in the
-        attribute `removed`.  Nothing else is subtracted.
+        Channels to take a constant, or a straight line, off; "all" for all.  What was taken off, and nothing else is,
+        stands in the attribute `removed`.
     rest : (float, float), optional
-        From when to when table and block were at rest, s: what is taken off is then fitted to these samples, else
-        to all.
+        From when to when table and block were at rest, s: what is taken off is fitted to these samples, else to all.
     threshold : float, optional
         Relative acceleration beyond which the block slides, m/s²; by default 4 standard deviations of its noise, and
         0.5 % of the table's largest acceleration at least.

@@ -30,10 +30,9 @@ from slipsweep.model.variables import HISTORY
 from slipsweep.motion.cutting import wave_of_record
 from slipsweep.motion.records import Record
 from slipsweep.motion.shaking import RESPONSES, TABLE, ShakingTest, check_channels
-from slipsweep.studies import table_motion
 from slipsweep.studies.friction import check_contact
+from slipsweep.studies.table_motion import Floats, converter_noise, noise_of, runs_of, table_motion
 
-Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 #: The series of `HISTORY` at some times, for Üy, λ and Δμ.
@@ -48,7 +47,7 @@ _LEAST_NOISE = 1e-5
 #: Intervals of sampling to either side of a jump that are left out.
 _BESIDE_A_JUMP = 1.6
 
-#: Standard deviation of an offset or drift, in parts of a channel's largest value: no bound, in effect.
+#: Standard deviation of an offset, drift or step, in parts of a channel's largest value: no bound, in effect.
 _LARGE = 3.0
 
 #: Noise of the channels, in parts of their largest values, of a rough likelihood.
@@ -89,8 +88,7 @@ class Linear:
         return np.asarray(rest - self._shrunk @ (self.left.T @ rest))
 
     def _raw(self, parameters: Floats) -> Floats:
-        computed = self.computed(parameters)
-        return np.where(np.isfinite(computed), self.measured - computed, 1e3)
+        return np.nan_to_num(self.measured - self.computed(parameters), nan=1e3, posinf=1e3, neginf=1e3)
 
     def nuisances(self, parameters: Floats) -> tuple[Floats, Floats]:
         """Most likely values of the nuisance parameters and their standard deviations, in those of their priors."""
@@ -137,10 +135,10 @@ class Observation:
         self._beside_jumps = np.zeros_like(self._use)
         self._weights = np.array([_weights_of(values) for values in measured])
         self.largest = np.nanmax(np.abs(measured), axis=1)
-        converters = [max(table_motion.converter_noise(values), 1e-15) for values in measured]
+        converters = [max(converter_noise(values), 1e-15) for values in measured]
         self._least_noise = np.maximum(_LEAST_NOISE * self.largest, converters)
         self._given_noise = np.array([noise.get(name, np.nan) for name in self.channels])
-        scatter = np.maximum([table_motion.noise_of(values) for values in measured], self._least_noise)
+        scatter = np.maximum([noise_of(values) for values in measured], self._least_noise)
         self.sensor_noise = np.where(np.isnan(self._given_noise), scatter, self._given_noise)
         self._noise = self.sensor_noise.copy()
         self.lines: list[Line] = []
@@ -151,7 +149,7 @@ class Observation:
                 self.lines.append(Line("offset", name, size, np.full(since.size, size)))
             if name in drifts:
                 self.lines.append(Line("drift", name, size, size * since))
-        self.motion = table_motion.table_motion(test.times, test.channels[TABLE])
+        self.motion = table_motion(test.times, test.channels[TABLE])
         of_table = [np.interp(self.motion.times, test.times, one.values) for one in self.lines if one.channel == TABLE]
         self._shapes = np.column_stack([self.motion.shapes, *(-line for line in of_table)])
         self.wrong = np.zeros(self._shapes.shape[1])
@@ -214,13 +212,13 @@ class Observation:
         measured = self._weighted(self.test.channels) + effects[:, :moving] @ self.wrong
         self.linear = Linear(functools.partial(computed, self.forward), measured, effects)
 
-    def unexplained(self, parameters: Floats) -> list[Floats]:
+    def _unexplained(self, parameters: Floats) -> list[Floats]:
         """What nothing explains of the samples of each channel, in its own unit."""
         return self._by_channel(self.linear.unexplained(parameters) / self._scale)
 
     def misfits(self, parameters: Floats) -> list[float]:
         """Root mean square of what nothing explains of each channel."""
-        return [float(np.sqrt(np.mean(rest**2))) for rest in self.unexplained(parameters)]
+        return [float(np.sqrt(np.mean(rest**2))) for rest in self._unexplained(parameters)]
 
     def cycle(self, begin: float, end: float, speed: float) -> Linear:
         """The samples between two times; the motion at the beginning is unknown, velocities of the order of `speed`."""
@@ -235,7 +233,7 @@ class Observation:
     def settle(self, parameters: Floats) -> None:
         """Estimate the noise that is not given, take the table's motion as most likely, leave out samples at jumps."""
         leverage = self._by_channel(self.linear.left**2 @ self.linear.known)
-        weights, rests = self._by_channel(self._scale), self.unexplained(parameters)
+        weights, rests = self._by_channel(self._scale), self._unexplained(parameters)
         for at, (rest, part) in enumerate(zip(rests, leverage, strict=True)):
             weight = weights[at] * self._noise[at]
             freedom = float(np.sum(weight**2)) - float(np.sum(part)) - 1.0
@@ -271,15 +269,15 @@ class Observation:
             velocity = np.gradient(channels["relative_displacement"], times)
         else:
             return
-        noise = max(table_motion.noise_of(velocity), 2e-3 * float(np.nanmax(np.abs(velocity))))
+        noise = max(noise_of(velocity), 2e-3 * float(np.nanmax(np.abs(velocity))))
         upslope = np.nan_to_num(velocity) < -_UPSLOPE_NOISE * noise
         several = ndimage.binary_opening(upslope, np.ones(_UPSLOPE_SAMPLES))
         slips = ndimage.binary_dilation(several, iterations=3)
         self._use = self._use & ~slips
-        self.upslope = [float(times[slip.start]) for slip in table_motion.runs_of(slips)]
-        if "relative_displacement" in channels:
-            size = 3.0 * float(np.nanmax(np.abs(channels["relative_displacement"])))
-            for slip in table_motion.runs_of(slips):
+        for slip in runs_of(slips):
+            self.upslope.append(float(times[slip.start]))
+            if "relative_displacement" in channels:
+                size = _LARGE * float(np.nanmax(np.abs(channels["relative_displacement"])))
                 name, step = f"upslope slip at {times[slip.start]:.4g} s", size * (times > times[slip.stop - 1])
                 self.lines.append(Line(name, "relative_displacement", size, step))
 

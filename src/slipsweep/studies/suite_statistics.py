@@ -104,8 +104,7 @@ def suite_statistics(
     for name in ("permanent_displacement", "validity"):
         if name not in result.data_vars:
             raise InputError(f"result: {name}: missing: must be there, of all motions")
-    dims = suite_dims(result["permanent_displacement"], over)
-    g = float(result.attrs.get("g", np.nan))
+    dims, g = suite_dims(result["permanent_displacement"], over), float(result.attrs.get("g", np.nan))
     limits, wanted = check_thresholds("thresholds", thresholds, g), check_increasing("quantiles", quantiles, "quantile")
     least = check_thresholds("zero", zero, g)
     if least.size > 1:
@@ -176,8 +175,8 @@ def suite_dims(values: xr.DataArray, over: Any = None) -> tuple[str, ...]:
     return tuple(dict.fromkeys(dims))
 
 
-def limit_quantiles(limits: xr.Dataset, quantiles: Any = QUANTILES) -> xr.Dataset:
-    """Quantiles of the limit amplitudes of a suite's motions, at every other grid point: `limit_amplitude`'s result.
+def limit_quantiles(limits: xr.Dataset) -> xr.Dataset:
+    """`QUANTILES` of the limit amplitudes of a suite's motions, at every other grid point: `limit_amplitude`'s result.
 
     A motion that does not reach the displacement up to the maximum amplitude has a limit above all others: a
     `limit_quantile` (m/s²) is infinite where too many do not.  Those without a value are left out of it, and of
@@ -188,8 +187,8 @@ def limit_quantiles(limits: xr.Dataset, quantiles: Any = QUANTILES) -> xr.Datase
     # so large that whatever is interpolated towards it is above all limits
     largest = np.finfo(np.float64).max / 4.0
     values = limits["limit_amplitude"].where(~beyond, largest)
-    wanted = check_increasing("quantiles", quantiles, "quantile")
-    found = _quantiles(values, wanted, dims)
+    quantiles = np.array(QUANTILES)
+    found = _quantiles(values, quantiles, dims)
     highest = values.where(~beyond).max()
     return xr.Dataset(
         {
@@ -197,7 +196,7 @@ def limit_quantiles(limits: xr.Dataset, quantiles: Any = QUANTILES) -> xr.Datase
             "value_count": values.count(dims),
             "not_reached_count": beyond.sum(dims),
         },
-        {"quantile": wanted},
+        {"quantile": quantiles},
         limits.attrs,
     )
 
