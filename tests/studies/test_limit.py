@@ -16,14 +16,6 @@ from tests.support.cases import choices
 from tests.support.commands import command
 from tests.support.made_up_records import made
 
-OPTIONS: list[dict[str, Any]] = [
-    {},
-    {"rise": "literal"},
-    {"recoupling": "integrate"},
-    {"model": "newmark"},
-    {"yield_acceleration": 0.6},
-]
-
 
 def sweep_at(amplitude: xr.DataArray, inputs: dict[str, Any], **options: Any) -> xr.DataArray:
     given: dict[str, Any] = {
@@ -36,7 +28,11 @@ def sweep_at(amplitude: xr.DataArray, inputs: dict[str, Any], **options: Any) ->
     ).permanent_displacement
 
 
-@pytest.mark.parametrize("options", OPTIONS, ids=str)
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"rise": "literal"}, {"recoupling": "integrate"}, {"model": "newmark"}, {"yield_acceleration": 0.6}],
+    ids=str,
+)
 def test_inverse_of_sweep_to_the_last_bit(options: dict[str, Any]) -> None:
     inputs: dict[str, Any] = {"theta": [0.0, 6.0, 14.0], "mu_s": [0.2, 0.38, 0.7, 1.2], "frequency": [0.3, 1.0, 7.0]}
     displacement = [1e-3, 0.05, 0.8]

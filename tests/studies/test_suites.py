@@ -152,8 +152,6 @@ def test_samples_are_those_of_each_motion(strength: str, time_scale: Any) -> Non
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"amplitude": 2, "scale": 1}, "amplitude, scale: must not both be given"),
-        ({"frequency": 1}, "frequency: not allowed with a Suite"),
         ({"excitation": PAIRS}, "azimuth: must be given with pairs"),
         ({"pgv": -1}, "pgv = -1: must be"),
         ({"variables": ["sliding_mode"]}, "variables = 'sliding_mode'"),

@@ -111,7 +111,7 @@ def calibrate(
     block = options.in_own_units({"theta": theta, "phi": phi}, model.g) | {"mu_s": mu_s}
     paths = common.check_outputs(output, (".nc", ".toml", *FIGURES), overwrite, tests)
     from slipsweep.studies.calibration import calibrate as calibrated
-    from slipsweep.studies.findings import sweep_file_text
+    from slipsweep.studies.calibration import sweep_file_text
 
     offsets, drifts = _channels(offset), _channels(drift)
     table = calibrated(tests, **block, model=model, offset=offsets, drift=drifts, cycles=cycles)

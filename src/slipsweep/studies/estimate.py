@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, least_squares
 
 from slipsweep.studies.datasets import sweep
-from slipsweep.studies.likelihood import SOUGHT, Linear, Observation
-from slipsweep.studies.table_motion import Floats, runs_of
+from slipsweep.studies.friction import Floats
+from slipsweep.studies.likelihood import SOUGHT, Linear, Observation, runs_of
 
 #: What decides the block's acceleration, of each test.
 Readings = tuple[str, ...]

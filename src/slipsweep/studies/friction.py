@@ -24,10 +24,14 @@ from slipsweep.errors import InputError
 from slipsweep.model.parameters import check_finite, check_numbers, check_single, shown, single_friction_coefficient
 from slipsweep.model.variables import HISTORY, MEASURED_FRICTION, PARAMETERS, REFERENCE, SLIDES
 from slipsweep.motion.shaking import CHANNELS, TABLE, ShakingTest, read_test, removed_text, unit_factor
-from slipsweep.studies.table_motion import Floats, noise_of
+
+Floats = NDArray[np.float64]
 
 #: What a caller may give as a test.
 Test = str | Path | ShakingTest | xr.Dataset | Mapping[str, xr.DataArray]
+
+#: Third differences of white noise have 20 times its variance; those of a motion that the sampling resolves are small.
+_VARIANCE = 20.0
 
 #: The threshold of a slide: standard deviations of the noise of r, of which one sample in 16 000 exceeds 4 by chance,
 #: and at least a part of the table's largest acceleration, by which two sensors may disagree.
@@ -49,6 +53,12 @@ SOURCE = {"source": f"slipsweep {__version__}", "references": REFERENCE}
 
 #: The ends of intervals of results.
 BOUND = xr.Variable(("bound",), [0.025, 0.975], {"units": "1", "long_name": "probability below an end of an interval"})
+
+
+def noise_of(values: Floats) -> float:
+    """Standard deviation of the noise of evenly or nearly evenly sampled values: robust, from third differences."""
+    differences = np.diff(values[np.isfinite(values)], 3) / _VARIANCE**0.5
+    return float(1.4826 * np.median(np.abs(differences))) if differences.size else 0.0
 
 
 def threshold_of(table: Floats, block: Floats) -> tuple[float, str]:

@@ -64,7 +64,7 @@ def suite_statistics(
         - `valueless_flag_count`, dimension `flag`: motions without a value, by reason.  One may have several.
         - `zero_probability`: share of displacements of `zero` at most.
         - `nonzero_median`, `nonzero_geometric_mean` (m) and `log_standard_deviation` (of natural logarithms, with
-          n - 1) of the others.
+          n - 1) of the others, which are described apart as by Bray and Travasarou [1]_.
         - `displacement_quantile` (m), dimension `quantile`, and `exceedance_probability`, dimension `threshold` (m):
           of all displacements, those that are zero, too.
 
@@ -79,10 +79,6 @@ def suite_statistics(
     --------
     displacement_hazard : with the seismic hazard of a site
     sample : statistics under uncertain inputs
-
-    Notes
-    -----
-    A share of zero displacements and the distribution of the others follows Bray and Travasarou [1]_.
 
     References
     ----------
