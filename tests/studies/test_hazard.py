@@ -93,9 +93,6 @@ def test_the_rate_lies_between_those_of_the_lower_and_the_higher_probability_of_
     np.testing.assert_allclose([found["lower_rate"][0], found["upper_rate"][0]], [last, first], rtol=1e-12)
 
 
-# ----------------------------------------------------------------- of a suite, of uncertain inputs, of both
-
-
 def test_of_a_suite_by_hand() -> None:
     """Shares of motions; amplitudes in any order and 0; amplitudes, and grid points, without a value."""
     nan, unstable = np.nan, int(Validity.STATICALLY_UNSTABLE)
@@ -163,9 +160,6 @@ def test_a_fragility_in_the_form_of_openquake() -> None:
     assert poes == {"u_above_10_mm": "0.5 1 1", "u_above_50_mm": "0.5 0.5 1"}
 
 
-# ------------------------------------------------------------------------------------ curves
-
-
 def test_a_curve_is_read(tmp_path: Path) -> None:
     path = tmp_path / "hazard.csv"
     path.write_text(CURVE)
@@ -216,9 +210,6 @@ def test_curves_that_are_refused(tmp_path: Path, text: str, message: str) -> Non
         read_hazard_curve(path, 9.81)
     assert message in str(refused.value)
     assert str(path) in str(refused.value)
-
-
-# ------------------------------------------------------------------------------- the command
 
 
 def test_the_command(tmp_path: Path) -> None:

@@ -91,8 +91,6 @@ def test_velocity_has_no_gaps_where_pieces_meet(shaken: str, model: Any) -> None
     assert velocity.max() > 0.01
 
 
-# ----------------------------------------------------------------- under a record
-
 MODELS: dict[str, Any] = {
     "mendez": "mendez",
     "literal": Mendez(rise="literal"),
@@ -226,8 +224,6 @@ def test_what_a_record_refuses(shaking: Record, given: dict[str, Any], message: 
     with pytest.raises(InputError, match=message):
         simulate(5.0, 0.4, excitation=shaking, **given)
 
-
-# -------------------------------------------------------------- the thread that it runs on
 
 ENDLESS = """
 import os, signal, threading, time

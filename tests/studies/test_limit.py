@@ -210,9 +210,6 @@ def test_refusals(given: dict[str, Any], message: str) -> None:
     assert message in str(refused.value)
 
 
-# ------------------------------------------------------------------- recorded motions
-
-
 @pytest.fixture(scope="module")
 def shaking() -> Record:
     """Some pulses of different sizes and both signs."""
@@ -305,19 +302,14 @@ def test_no_limit_and_what_is_refused(shaking: Record) -> None:
         limit_amplitude(0.1, 5.0, 0.4, excitation=Record.sampled([0.0, 0.0, 0.0], 0.1))
 
 
-# ------------------------------------------------------------------------- command line
-
 SWEEP = """
 [model]
 friction = "newmark"
-[axes.theta]
-values = [0, 5]
-[axes.mu_s]
-values = [0.3, 0.5]
-[axes.amplitude]
-values = [1, 4]
-[axes.frequency]
-values = [1, 2, 4]
+[axes]
+theta.values = [0, 5]
+mu_s.values = [0.3, 0.5]
+amplitude.values = [1, 4]
+frequency.values = [1, 2, 4]
 [excitation]
 cycles = 3
 """

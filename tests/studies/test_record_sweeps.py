@@ -21,16 +21,11 @@ SWEEP = """
 record = "motion.csv"
 units = "g"
 polarity = "both"
-[axes.theta]
-values = [0, 5, 25]
-[axes.mu_s]
-values = [0.3, 0.4]
-[axes.scale]
-start = 0.5
-stop = 3
-num = 4
-[axes.time_scale]
-values = [1, 2]
+[axes]
+theta.values = [0, 5, 25]
+mu_s.values = [0.3, 0.4]
+scale = { start = 0.5, stop = 3, num = 4 }
+time_scale.values = [1, 2]
 """
 
 
@@ -54,9 +49,6 @@ def assert_same_data(one: Path, other: Path) -> None:
     xr.testing.assert_equal(first, second)
     names = {*first.attrs} - {"history"}
     assert {name: first.attrs[name] for name in names} == {name: second.attrs[name] for name in names}
-
-
-# ---------------------------------------------------------------------------- what is written
 
 
 def test_a_sweep_file_gives_what_python_gives(folder: Path) -> None:
@@ -90,18 +82,15 @@ def test_a_result_repeats_itself_without_the_record(folder: Path) -> None:
         spec.load(folder / "a.toml")
 
 
-# ------------------------------------------------------------------------------------- refused
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
         ('"motion.csv"', '"no.csv"', "no.csv: cannot be read"),
         ('"both"', "0", "polarity = 0: must be 1, -1, a list of these, or 'both'"),
         ('record = "motion.csv"\n', "", "excitation.units: only beside excitation.record"),
-        ("[axes.time_scale]", "[axes.amplitude]", "amplitude, scale: must not both be given"),
-        ("axes.time_scale", "axes.frequency", "frequency: not allowed with a Record"),
-        ("[axes.theta]", '[output]\nvariables = ["sliding_mode"]\n[axes.theta]', "variables = 'sliding_mode': must be"),
+        ("time_scale.values", "amplitude.values", "amplitude, scale: must not both be given"),
+        ("time_scale.values", "frequency.values", "frequency: not allowed with a Record"),
+        ("[axes]", '[output]\nvariables = ["sliding_mode"]\n[axes]', "variables = 'sliding_mode': must be"),
     ],
 )
 def test_sweep_files_that_are_refused(folder: Path, old: str, new: str, message: str) -> None:

@@ -40,9 +40,6 @@ def reduced(sampling: Sampling, values: np.ndarray) -> dict[str, np.ndarray]:
     return {name: one[0] for name, one in found.items()}
 
 
-# ----------------------------------------------------------------------------- closed forms
-
-
 @pytest.mark.parametrize("seed", [0, 1])
 def test_ishigamis_function(seed: int) -> None:
     sampling = sampling_of(ANGLES, sensitivity=True, samples=2**14, seed=seed)
@@ -136,8 +133,6 @@ def test_correlated_inputs_are_one() -> None:
         np.testing.assert_allclose(found[index], [share, 1 - share], rtol=0.02)
 
 
-# --------------------------------------------------------------------- the grid, and no value
-
 CASE: dict[str, Any] = {"theta": [0.0, 15.0], "amplitude": [0.5, 4.0, 8.0], "samples": 128, "sensitivity": True}
 
 
@@ -168,26 +163,16 @@ def test_what_is_refused(options: dict[str, Any], message: str) -> None:
         sampling_of(ANGLES, **{"sensitivity": True, **options})
 
 
-# -------------------------------------------------------------------- files
-
 SWEEP = """
-[axes.theta]
-values = [0, 5]
-[axes.amplitude]
-values = [0.2, 2, 4, 6, 8]
-[axes.frequency]
-values = [1, 2]
+[axes]
+theta.values = [0, 5]
+amplitude.values = [0.2, 2, 4, 6, 8]
+frequency.values = [1, 2]
 [uncertainty]
 samples = 256
 sensitivity = true
-[uncertainty.mu_s]
-distribution = "uniform"
-loc = 0.35
-scale = 0.1
-[uncertainty.amplitude]
-kind = "factor"
-distribution = "lognorm"
-s = 0.3
+mu_s = { distribution = "uniform", loc = 0.35, scale = 0.1 }
+amplitude = { kind = "factor", distribution = "lognorm", s = 0.3 }
 """
 
 

@@ -97,9 +97,6 @@ def test_lazy_results_and_parts_have_the_same_bits() -> None:
     )
 
 
-# ------------------------------------------------------------------------------------- pairs
-
-
 def test_an_azimuth_of_pairs_is_the_component_there() -> None:
     azimuths = [0.0, 30.0, 90.0, 210.0]
     found = sweep([0, 5], 0.2, excitation=PAIRS, azimuth=azimuths, amplitude=[3.0, 6.0])
@@ -114,9 +111,6 @@ def test_an_azimuth_of_pairs_is_the_component_there() -> None:
             np.testing.assert_array_equal(found.permanent_displacement.isel(where), alone.permanent_displacement)
             assert float(found.motion_pga.isel(where)) == component.peak
             assert float(found.motion_mean_period.isel(where)) == intensity_measures(component)["mean_period"]
-
-
-# -------------------------------------------------------------------------- limits and samples
 
 
 def test_limits_are_those_of_each_motion() -> None:
@@ -144,9 +138,6 @@ def test_samples_are_those_of_each_motion(strength: str, time_scale: Any) -> Non
         alone = sample(5, excitation=motion, **given)
         for name in alone.data_vars:
             np.testing.assert_allclose(found[name].isel(motion=at), alone[name], rtol=1e-14, err_msg=str(name))
-
-
-# --------------------------------------------------------------------------------- what is refused
 
 
 @pytest.mark.parametrize(

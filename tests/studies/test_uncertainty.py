@@ -51,9 +51,6 @@ def assert_statistics(found: xr.Dataset, swept: xr.Dataset, dim: str, rtol: floa
         np.testing.assert_allclose(own, one, rtol=tolerance, atol=min(tolerance, 1e-15), err_msg=name)
 
 
-# ----------------------------------------------------------------------------- closed forms
-
-
 @pytest.mark.parametrize("model", ["newmark", "mendez"])
 def test_quantiles_are_those_of_the_input(model: str) -> None:
     """u falls with Üy, so that its quantile q is u at the quantile 1 − q of Üy."""
@@ -75,9 +72,6 @@ def test_exceedance_is_the_distribution_at_the_limit() -> None:
     limits = slipsweep.limit_amplitude(thresholds, **block, maximum_amplitude=200.0)
     assert bool((limits.limit_status == 0).all())
     np.testing.assert_allclose(found.exceedance_probability, shaking.sf(limits.limit_amplitude), atol=2e-4)
-
-
-# -------------------------------------------------------------- statistics of plain sweeps
 
 
 UNCERTAIN: list[dict[str, Any]] = [
@@ -204,9 +198,6 @@ def test_correlation_of_normal_scores() -> None:
         )
 
 
-# ----------------------------------------------------------- what has no value, and chunks
-
-
 def test_statically_unstable_samples_exceed_every_threshold() -> None:
     """A block that slides under its own weight (μs ≤ tan θ) has no displacement by the model."""
     friction = stats.lognorm(0.2, scale=0.3)
@@ -230,9 +221,6 @@ def test_statically_unstable_samples_exceed_every_threshold() -> None:
     assert nobody.displacement_quantile.isnull().all()
 
 
-# ------------------------------------------------------------------------- seeds and records
-
-
 @pytest.mark.parametrize("method", ["sobol", "latin_hypercube", "random"])
 def test_a_seed_gives_the_same_bits(method: str) -> None:
     def run(seed: int) -> xr.Dataset:
@@ -242,9 +230,6 @@ def test_a_seed_gives_the_same_bits(method: str) -> None:
     assert not run(5).mean_displacement.equals(run(6).mean_displacement)
     assert run(5).attrs["seed"] == 5
     assert run(5).attrs["sampling"].startswith(method)
-
-
-# ---------------------------------------------------------------------------------- errors
 
 
 @pytest.mark.parametrize(
@@ -285,18 +270,11 @@ def test_bad_options(options: dict[str, Any], message: str) -> None:
         slipsweep.sample(**{**GRID, "uncertain": uncertain, **options})
 
 
-# --------------------------------------------------------------- sweep files, commands, charts
-
 FILE = """
-[axes.theta]
-values = [0, 5]
-[axes.amplitude]
-start = 0.1
-stop = 1
-num = 10
-units = "g"
-[axes.frequency]
-values = [1, 2]
+[axes]
+theta.values = [0, 5]
+amplitude = { start = 0.1, stop = 1, num = 10, units = "g" }
+frequency.values = [1, 2]
 [excitation]
 cycles = 5
 [uncertainty]
@@ -304,18 +282,9 @@ samples = 256
 seed = 7
 thresholds = ["1cm", 0.1]
 correlation = [["mu_s", "yield_acceleration", 0.5]]
-[uncertainty.mu_s]
-distribution = "lognorm"
-s = 0.1
-scale = 0.4
-[uncertainty.amplitude]
-kind = "factor"
-distribution = "lognorm"
-s = 0.3
-[uncertainty.yield_acceleration]
-kind = "factor"
-distribution = "lognorm"
-s = 0.15
+mu_s = { distribution = "lognorm", s = 0.1, scale = 0.4 }
+amplitude = { kind = "factor", distribution = "lognorm", s = 0.3 }
+yield_acceleration = { kind = "factor", distribution = "lognorm", s = 0.15 }
 """
 
 
@@ -369,16 +338,8 @@ def test_a_result_is_repeated_from_itself(folder: Path) -> None:
     [
         ("seed = 7", "sed = 7", 'uncertainty.sed: unknown key; did you mean "seed"?'),
         ("s = 0.15", "q = 0.15", "uncertainty.yield_acceleration: has q: lognorm takes s, loc, scale"),
-        (
-            "[axes.theta]\nvalues = [0, 5]",
-            "[axes.mu_s]\nvalues = [0.3, 0.4]",
-            "uncertainty.mu_s: is drawn, but mu_s is given as well",
-        ),
-        (
-            "[excitation]",
-            '[output]\nvariables = ["validity"]\n[excitation]',
-            "output.variables: not allowed beside [unc",
-        ),
+        ("theta.values = [0, 5]", "mu_s.values = [0.3, 0.4]", "uncertainty.mu_s: is drawn, but mu_s is given as well"),
+        ("[excitation]", '[output]\nvariables = ["validity"]\n[excitation]', "output.variables: not allowed beside"),
     ],
 )
 def test_bad_sweep_files(tmp_path: Path, old: str, new: str, message: str) -> None:

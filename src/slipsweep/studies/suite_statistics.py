@@ -241,10 +241,10 @@ def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100)
             shares[f"P(u > {d * 1000.0:.6g} mm)"] = column
     if (rows["valueless_share"] > 0.0).any():
         shares["no value"] = rows["valueless_share"][0]
-    for title, column in shares.items():
-        columns[title] = ["none" if np.isnan(one) else f"{one:.1%}" for one in column]
-    table = pd.DataFrame(columns).to_string(index=False).splitlines()
-    return [f"permanent displacement (mm) over {suite}:", *table]
+    columns |= {
+        title: ["none" if np.isnan(one) else f"{one:.1%}" for one in column] for title, column in shares.items()
+    }
+    return [f"permanent displacement (mm) over {suite}:", *pd.DataFrame(columns).to_string(index=False).splitlines()]
 
 
 def at_thresholds(found: xr.Dataset, thresholds: Thresholds) -> xr.Dataset:

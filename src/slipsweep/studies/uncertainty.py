@@ -20,7 +20,6 @@ from slipsweep.grid import inputs as grid_inputs
 from slipsweep.model import options, parameters, variables
 from slipsweep.motion.waveforms import Waveform
 from slipsweep.studies import datasets
-from slipsweep.studies.datasets import Values
 from slipsweep.studies.sampling import ENDS, SOBOL_MEMORY, Floats, Sampling, Thresholds, sobol_indices
 
 TITLE = "Permanent displacement of a rigid block under uncertain inputs"
@@ -69,12 +68,12 @@ _DRAW = "draw of the uncertain inputs"
 
 @datasets.naming_choices
 def sample(
-    theta: Values | None = None,
-    mu_s: Values | None = None,
-    amplitude: Values | None = None,
-    frequency: Values | None = None,
+    theta: datasets.Values | None = None,
+    mu_s: datasets.Values | None = None,
+    amplitude: datasets.Values | None = None,
+    frequency: datasets.Values | None = None,
     *,
-    phi: Values | None = None,
+    phi: datasets.Values | None = None,
     uncertain: Mapping[str, Any],
     excitation: datasets.Excitation = "sine",
     model: options.Model | str = "mendez",
@@ -87,18 +86,18 @@ def sample(
     correlation: Sequence[tuple[str, str, float]] = (),
     sensitivity: bool = False,
     over: str | Sequence[str] = (),
-    displacement_amplitude: Values | None = None,
-    scale: Values | None = None,
-    pgv: Values | None = None,
-    arias_intensity: Values | None = None,
-    time_scale: Values | None = None,
+    displacement_amplitude: datasets.Values | None = None,
+    scale: datasets.Values | None = None,
+    pgv: datasets.Values | None = None,
+    arias_intensity: datasets.Values | None = None,
+    time_scale: datasets.Values | None = None,
     polarity: datasets.Signs | None = None,
-    azimuth: Values | None = None,
-    yield_acceleration: Values | None = None,
-    yield_coefficient: Values | None = None,
-    decay_rate: Values | None = None,
-    delta_mu: Values | None = None,
-    minimum_friction: Values | None = None,
+    azimuth: datasets.Values | None = None,
+    yield_acceleration: datasets.Values | None = None,
+    yield_coefficient: datasets.Values | None = None,
+    decay_rate: datasets.Values | None = None,
+    delta_mu: datasets.Values | None = None,
+    minimum_friction: datasets.Values | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> xr.Dataset:
     """Quantiles and exceedance probabilities of the permanent displacement under uncertain inputs.
