@@ -129,11 +129,8 @@ def test_offset_and_drift_are_taken_off_where_named(stick_slip: xr.Dataset) -> N
 
 def test_a_file_is_read_with_its_units(stick_slip: xr.Dataset, tmp_path: Path) -> None:
     path = tmp_path / "test.csv"
-    columns = (
-        stick_slip.time.values * 1e3,
-        stick_slip.ground_acceleration / 9.80665,
-        stick_slip.block_acceleration * 100,
-    )
+    time, tables, blocks = (stick_slip[name].values for name in ("time", "ground_acceleration", "block_acceleration"))
+    columns = time * 1e3, tables / 9.80665, blocks * 100
     rows = "\n".join(f"{t:.9g};{table:.15g};;{block:.15g}" for t, table, block in zip(*columns, strict=True))
     path.write_text(f"# a test\nTime [ms];Table acceleration (g);remark;Block_acceleration (gal)\n{rows}\n")
     found = friction(path)
@@ -146,9 +143,8 @@ def test_a_dataset_is_taken_in_its_units(stick_slip: xr.Dataset) -> None:
     in_g = {name: stick_slip[name] / 9.80665 for name in ("ground_acceleration", "block_acceleration")}
     for array in in_g.values():
         array.attrs["units"] = "g"
-    np.testing.assert_allclose(
-        friction(in_g).friction_coefficient, friction(stick_slip).friction_coefficient, atol=1e-12
-    )
+    found, expected = friction(in_g), friction(stick_slip)
+    np.testing.assert_allclose(found.friction_coefficient, expected.friction_coefficient, atol=1e-12)
 
 
 HEAD = "time (s),table acceleration (m/s2),block acceleration (m/s2)\n"

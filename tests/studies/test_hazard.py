@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.stats import norm
 
 import slipsweep
@@ -23,6 +24,12 @@ ATTRIBUTES = {"source": "slipsweep test", **MODELS.attributes(Newmark())}
 
 def curve_of(amplitude: list[float], rate: list[float]) -> HazardCurve:
     return HazardCurve(np.array(amplitude), np.array(rate))
+
+
+def write(folder: Path, result: xr.Dataset, curve: str = CURVE) -> None:
+    """A result and a hazard curve, as the command takes them."""
+    result.assign_attrs(ATTRIBUTES).to_netcdf(folder / "a.nc")
+    (folder / "hazard.csv").write_text(curve)
 
 
 def power_law(k0: float, k: float, points: int = 12) -> HazardCurve:
@@ -86,9 +93,6 @@ def test_the_rate_lies_between_those_of_the_lower_and_the_higher_probability_of_
     np.testing.assert_allclose([found["lower_rate"][0], found["upper_rate"][0]], [last, first], rtol=1e-12)
 
 
-# ----------------------------------------------------------------- of a suite, of uncertain inputs, of both
-
-
 def test_of_a_suite_by_hand() -> None:
     """Shares of motions; amplitudes in any order and 0; amplitudes, and grid points, without a value."""
     nan, unstable = np.nan, int(Validity.STATICALLY_UNSTABLE)
@@ -119,17 +123,12 @@ def test_of_a_suite_by_hand() -> None:
     assert certain.annual_rate[0, 0].item() == pytest.approx(0.1 / 3.0 / 9.0, rel=1e-12)
 
 
-def suite() -> Suite:
-    times = np.arange(0.0, 4.0, 0.01)
-    motions = [Record(times, np.sin(2.0 * np.pi * f * times) * np.exp(-times), name=f"m{f}") for f in (0.8, 1.5, 2.5)]
-    return Suite(tuple(motions))
-
-
 def test_friction_that_is_uncertain_over_a_suite() -> None:
     """Pooled by `sample` or not, motions weigh the same; the rate is that of the fragility of all samples."""
-    curve = power_law(1e-3, 2.0)
+    curve, times = power_law(1e-3, 2.0), np.arange(0.0, 4.0, 0.01)
+    motions = [Record(times, np.sin(2.0 * np.pi * f * times) * np.exp(-times), name=f"m{f}") for f in (0.8, 1.5, 2.5)]
     given: dict[str, Any] = {
-        "theta": 5.0, "amplitude": [2.0, 4.0, 6.0, 8.0], "excitation": suite(), "samples": 256,
+        "theta": 5.0, "amplitude": [2.0, 4.0, 6.0, 8.0], "excitation": Suite(tuple(motions)), "samples": 256,
         "uncertain": {"mu_s": {"distribution": "lognorm", "s": 0.1, "scale": 0.4}}, "thresholds": [0.01, 0.1],
     }  # fmt: skip
     pooled = slipsweep.sample(**given, over="motion")
@@ -159,9 +158,6 @@ def test_a_fragility_in_the_form_of_openquake() -> None:
     assert (imls.text, imls.attrib) == ("0.1 0.2 0.4", {"imt": "PGA", "noDamageLimit": "0.1"})
     poes = {one.attrib["ls"]: one.text for one in functions[0].findall("nrml:poes", space)}
     assert poes == {"u_above_10_mm": "0.5 1 1", "u_above_50_mm": "0.5 0.5 1"}
-
-
-# ------------------------------------------------------------------------------------ curves
 
 
 def test_a_curve_is_read(tmp_path: Path) -> None:
@@ -203,10 +199,7 @@ def test_a_file_of_openquake(tmp_path: Path) -> None:
         ("PGA (mm), annual rate\n1,2\n", 'unit = "mm": must be a unit that converts to m s-2'),
         ("PGA (g), annual probability\n1,2\n", "must be an annual rate, -ln(1 - p)"),
         ("PGA (g), annual rate\n0.1,x\n", "line 2: annual rate = 'x': must be a number"),
-        (
-            "PGA (m/s2), annual rate\n1,0.02\n1,0.01\n",
-            "amplitude of point 2 = 1: must be > 0, and greater than",
-        ),
+        ("PGA (m/s2), annual rate\n1,0.02\n1,0.01\n", "amplitude of point 2 = 1: must be > 0, and greater than"),
         ("PGA (m/s2), annual rate\n1,0.02\n2,0\n", "rate of point 2 = 0: must be > 0"),
     ],
 )
@@ -219,9 +212,6 @@ def test_curves_that_are_refused(tmp_path: Path, text: str, message: str) -> Non
     assert str(path) in str(refused.value)
 
 
-# ------------------------------------------------------------------------------- the command
-
-
 def test_the_command(tmp_path: Path) -> None:
     """It prints the rates that the function gives, draws them, and says what to do about what is not known."""
     rng = np.random.default_rng(3)
@@ -231,9 +221,7 @@ def test_the_command(tmp_path: Path) -> None:
     u[0, 5, :3] = np.nan
     flags = np.where(np.isnan(u), int(Validity.UPLIFT), 0)
     result = suite_result(u, flags, ("mu_s", "amplitude", "motion")).assign_coords(amplitude=amplitude, mu_s=[0.3, 0.4])
-    result.attrs |= ATTRIBUTES
-    result.to_netcdf(tmp_path / "a.nc")
-    (tmp_path / "hazard.csv").write_text(CURVE)
+    write(tmp_path, result)
     run = ("hazard", "a.nc", "--curve", "hazard.csv", "-d", "0.2", "-d", "50mm", "-d", "90m")
     done = command(tmp_path, *run, "-o", "h.svg", "-o", "h.png", "-o", "f.xml")
     assert (done.returncode, done.stderr) == (0, "")
@@ -261,9 +249,7 @@ def test_the_command(tmp_path: Path) -> None:
 def test_the_end_of_the_curve_is_told_from_the_end_of_the_sweep(tmp_path: Path) -> None:
     u = np.array([[0.0, 0.1], [0.1, 0.2], [0.3, 0.4]])
     result = suite_result(u, np.zeros_like(u), ("amplitude", "motion")).assign_coords(amplitude=[5.0, 10.0, 20.0])
-    result.attrs |= ATTRIBUTES
-    result.to_netcdf(tmp_path / "a.nc")
-    (tmp_path / "hazard.csv").write_text("PGA (m/s2), annual rate\n6, 0.01\n12, 0.001\n")
+    write(tmp_path, result, "PGA (m/s2), annual rate\n6, 0.01\n12, 0.001\n")
     done = command(tmp_path, "hazard", "a.nc", "--curve", "hazard.csv", "-d", "5cm")
     assert "to compute it, extend the hazard curve" in done.stdout
     assert "the hazard curve begins at 0.6116 g, where displacements are exceeded already" in done.stdout
@@ -280,9 +266,7 @@ def test_the_end_of_the_curve_is_told_from_the_end_of_the_sweep(tmp_path: Path) 
 def test_what_the_command_refuses(tmp_path: Path, given: tuple[str, ...], message: str) -> None:
     result = suite_result(np.full((2, 3, 4), 0.1), np.zeros((2, 3, 4)), ("mu_s", "amplitude", "motion"))
     result = result.assign_coords(mu_s=[0.3, 0.4])
-    result.attrs |= ATTRIBUTES
-    result.to_netcdf(tmp_path / "a.nc")
-    (tmp_path / "hazard.csv").write_text(CURVE)
+    write(tmp_path, result)
     lengths = () if "-d" in given else ("-d", "1cm")
     done = command(tmp_path, "hazard", "a.nc", "--curve", "hazard.csv", *lengths, *given)
     assert (done.returncode, done.stdout) == (2, "")

@@ -1,4 +1,4 @@
-"""Time histories of slides that last long after the shaking: few points, and all of the slide."""
+"""Time histories: what they have in common with a sweep, a waveform and mechanics; slides that last long."""
 
 import subprocess
 import sys
@@ -8,18 +8,19 @@ import numpy as np
 import pytest
 
 import slipsweep
-from slipsweep import Cosine, Harmonics, Sine
+from slipsweep import InputError, Mendez, Record, Sine, simulate, sweep
+from slipsweep.model.variables import DEFAULT_RECORD_RESULTS, HISTORY
 
 #: Shaking that leaves Newmark's block with a velocity.
 SHAKEN: dict[str, Any] = {
-    "cosine": Cosine(),
+    "cosine": slipsweep.Cosine(),
     "ramp": Sine(cycles=3, ramp_out=0.7),
-    "harmonics": Harmonics([1, 0.5], [1, 2], phases=[0, 90]),
+    "harmonics": slipsweep.Harmonics([1, 0.5], [1, 2], phases=[0, 90]),
 }
 
 
 def history(yield_acceleration: float, excitation: Any) -> Any:
-    return slipsweep.simulate(
+    return simulate(
         0, 0.4, 3, 1.5, model="newmark", excitation=excitation, yield_acceleration=yield_acceleration,
         points_per_cycle=16,
     )  # fmt: skip
@@ -52,14 +53,14 @@ def test_a_long_slide_has_a_bounded_number_of_points(shaken: str, yield_accelera
 @pytest.mark.parametrize("solver", ["cycle", slipsweep.Step("simpson", 4096)], ids=["cycle", "step"])
 @pytest.mark.parametrize(
     "excitation",
-    [*(Sine(cycles, ramp) for cycles in (10, 23) for ramp in (0.3, 1.3, 2.0, 2.3)), Cosine(12)],
+    [*(Sine(cycles, ramp) for cycles in (10, 23) for ramp in (0.3, 1.3, 2.0, 2.3)), slipsweep.Cosine(12)],
     ids=str,
 )
-def test_cycles_behind_a_ramp_repeat_from_what_it_leaves(excitation: Sine | Cosine, solver: Any) -> None:
+def test_cycles_behind_a_ramp_repeat_from_what_it_leaves(excitation: Sine | slipsweep.Cosine, solver: Any) -> None:
     """A block that does not recouple comes out of the first cycles in motion: its pulses repeat from that velocity."""
     cell: dict[str, Any] = {"theta": 0, "mu_s": 0.4, "amplitude": 3, "frequency": 1, "yield_acceleration": 1e-3}
-    swept = slipsweep.sweep(**cell, excitation=excitation, solver=solver)
-    history = slipsweep.simulate(**cell, excitation=excitation)
+    swept = sweep(**cell, excitation=excitation, solver=solver)
+    history = simulate(**cell, excitation=excitation)
     assert int(swept.validity) & slipsweep.Validity.NOT_RECOUPLED
     assert float(swept.permanent_displacement) == pytest.approx(float(history.relative_displacement[-1]), rel=1e-10)
 
@@ -69,25 +70,159 @@ WHOLE: dict[str, Any] = {
     **SHAKEN,
     "triangle": slipsweep.Triangle(cycles=40, ramp_in=1.5),
     "square": slipsweep.Square(cycles=40),
-    "record": slipsweep.Record.sampled(3.0 * np.sin(0.7 * np.arange(60.0)) * np.linspace(0.3, 1.0, 60), 0.01),
+    "record": Record.sampled(3.0 * np.sin(0.7 * np.arange(60.0)) * np.linspace(0.3, 1.0, 60), 0.01),
 }
 
 
-@pytest.mark.parametrize("model", ["newmark", slipsweep.Mendez(), slipsweep.Mendez(recoupling="integrate")], ids=str)
+@pytest.mark.parametrize("model", ["newmark", Mendez(), Mendez(recoupling="integrate")], ids=str)
 @pytest.mark.parametrize("shaken", WHOLE)
 def test_velocity_has_no_gaps_where_pieces_meet(shaken: str, model: Any) -> None:
     """At an instant that rounding puts between two pieces the block does not stand still."""
     excitation, given = WHOLE[shaken], {"theta": 3, "mu_s": 0.4, "yield_acceleration": 0.3, "model": model}
-    if isinstance(excitation, slipsweep.Record):
+    if isinstance(excitation, Record):
         times = excitation.times
     else:
         given |= {"amplitude": 2.5, "frequency": 1.7}
         times = np.arange(48 * excitation.cycles + 1) / 48 / 1.7
     about = np.concatenate([np.nextafter(times, 0), times, np.nextafter(times, np.inf)])
     about = np.concatenate([np.nextafter(about, 0), about, np.nextafter(about, np.inf), times + 1e-13, times - 1e-13])
-    velocity = slipsweep.simulate(excitation=excitation, **given, times=np.unique(about.clip(0))).relative_velocity
+    velocity = simulate(excitation=excitation, **given, times=np.unique(about.clip(0))).relative_velocity
     assert np.abs(np.diff(velocity)[np.diff(velocity.time) < 1e-12]).max() < 1e-10
     assert velocity.max() > 0.01
+
+
+MODELS: dict[str, Any] = {
+    "mendez": "mendez",
+    "literal": Mendez(rise="literal"),
+    "integrate": Mendez(recoupling="integrate"),
+    "newmark": "newmark",
+}
+
+
+@pytest.fixture(scope="module")
+def shaking() -> Record:
+    """Noise with a band and an envelope of earthquakes: pulses of all sizes, several maxima each."""
+    rng = np.random.default_rng(7)
+    times = np.arange(0.0, 20.0, 0.01)
+    phases = rng.uniform(0, 2 * np.pi, 60)
+    bands = np.sin(2 * np.pi * np.linspace(0.3, 9.0, 60)[:, None] * times + phases[:, None]).sum(0)
+    wave = bands * (times / 4) ** 2 * np.exp(-times / 2.5)
+    return Record(times, 6.0 * wave / np.abs(wave).max())
+
+
+def case_of(seed: int) -> dict[str, Any]:
+    """A case of any kind, by its number."""
+    rng = np.random.default_rng(seed)
+    given: dict[str, Any] = {
+        "theta": rng.uniform(0, 15),
+        "mu_s": rng.uniform(0.3, 0.8),
+        "scale": rng.uniform(0.3, 3),
+        "time_scale": rng.uniform(0.3, 3),
+        "polarity": int(rng.choice([1, -1])),
+        "model": MODELS[str(rng.choice(list(MODELS)))],
+    }
+    return given | ({"yield_acceleration": rng.uniform(0.1, 2)} if rng.random() < 0.5 else {})
+
+
+def test_a_history_ends_where_the_sweep_does(shaking: Record) -> None:
+    """At rest, with the results of the sweep to the last bit and the displacement to rounding."""
+    valued, modes = 0, set()
+    for seed in range(40):
+        given = case_of(seed)
+        found, swept = simulate(excitation=shaking, **given), sweep(excitation=shaking, **given)
+        for name in DEFAULT_RECORD_RESULTS:
+            np.testing.assert_array_equal(found[name], swept[name])
+        if np.isnan(swept.permanent_displacement):
+            assert np.isnan(found.relative_displacement).all()
+            assert np.isfinite(found.ground_acceleration).all()
+            continue
+        valued += 1
+        modes |= {(bool(swept.stick_slip_pulses > 0), bool(swept.continuous_pulses > 0))}
+        assert found.relative_displacement.values[-1] == pytest.approx(swept.permanent_displacement.item(), rel=1e-12)
+        assert abs(found.relative_velocity.values[-1]) <= 1e-9 * swept.peak_relative_velocity.item()
+        peak, time = swept.peak_relative_velocity.item(), found.time.values
+        at = np.clip(found.relative_velocity.values.argmax(), 1, time.size - 2)
+        # everywhere, and closely where a short slide may have its peak
+        places = np.unique([*np.linspace(0.0, time[-1], 40_000), *np.linspace(time[at - 1], time[at + 1], 2_000)])
+        fine = simulate(excitation=shaking, **given, times=places)
+        assert 0.999 * peak <= fine.relative_velocity.max().item() <= peak * (1 + 1e-12)
+    assert valued > 20
+    assert modes >= {(False, False), (True, False), (True, True)}
+
+
+@pytest.mark.parametrize("seed", [3, 9, 40])
+def test_velocity_and_displacement_are_integrals(shaking: Record, seed: int) -> None:
+    """v̇ = Üg − Ü and u̇ = v, but for velocities upslope that a stick-slip pulse neglects."""
+    given = case_of(seed) | {"model": "newmark" if seed % 2 else Mendez(recoupling="integrate"), "scale": 2.0}
+    found = simulate(excitation=shaking, **given, times=np.linspace(0.0, 60.0, 600_001))
+    velocity, step = found.relative_velocity.values, 1e-4
+    assert velocity.max() > 0.0
+    moved = np.concatenate([[0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * step)])
+    np.testing.assert_allclose(moved, found.relative_displacement, atol=1e-4 * abs(moved).max())
+    rate = (found.ground_acceleration - found.block_acceleration).values
+    gained = 0.5 * (rate[1:] + rate[:-1]) * step
+    # at an onset, a stop or a jump of the block's acceleration inside a step the two differ
+    wrong = np.abs(np.diff(velocity) - gained) > 1e-6 * velocity.max()
+    neglected = (velocity[:-1] < 0.0) & (velocity[1:] == 0.0)
+    assert (wrong & ~neglected).mean() < 1e-3
+
+
+def test_a_triangle_given_by_its_corners_moves_as_the_waveform() -> None:
+    """In stick-slip, whose rules are the same under a record."""
+    cycles, frequency = 4, 1.3
+    corners = np.array([0.0, 1.0, 0.0, -1.0])
+    times = np.arange(4 * cycles + 1) / (4 * frequency)
+    record = Record(times, 3.0 * np.append(np.tile(corners, cycles), 0.0))
+    block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.45, "yield_acceleration": 1.1}
+    at = np.linspace(0.0, 5.0, 4001)
+    wave = simulate(**block, amplitude=3.0, frequency=frequency, excitation=slipsweep.Triangle(cycles=cycles), times=at)
+    assert wave.sliding_mode == slipsweep.SlidingMode.STICK_SLIP
+    own = simulate(**block, excitation=record, times=at)
+    for name in HISTORY:
+        np.testing.assert_allclose(own[name], wave[name], rtol=1e-9, atol=1e-11, err_msg=name)
+
+
+def test_time_and_sign_only_scale(shaking: Record) -> None:
+    """v ∝ time_scale, u ∝ time_scale²; a record turned and taken with the other sign is the same motion."""
+    given: dict[str, Any] = {"theta": 4.0, "mu_s": 0.4, "scale": 1.7}
+    one = simulate(excitation=shaking, **given)
+    slow = simulate(excitation=shaking, **given, time_scale=2.5)
+    np.testing.assert_allclose(slow.time, 2.5 * one.time, rtol=1e-15)
+    for name, power in zip(HISTORY, (0, 0, 0, 1, 2), strict=True):
+        np.testing.assert_allclose(slow[name], one[name] * 2.5**power, rtol=1e-14, err_msg=name)
+    turned = Record(shaking.times, -shaking.acceleration)
+    other = simulate(excitation=turned, **given, polarity=-1)
+    for name in HISTORY:
+        np.testing.assert_array_equal(other[name], one[name])
+    assert float(one.permanent_displacement) > 0.0
+
+
+def test_the_plane_moves_as_recorded(shaking: Record) -> None:
+    """Straight between the samples, and at rest before and after them."""
+    late = Record(shaking.times + 3.0, shaking.acceleration)
+    times = np.linspace(-1.0, 30.0, 12_345)
+    found = simulate(5.0, 0.4, excitation=late, amplitude=4.0, polarity=-1, times=times)
+    expected = np.interp(times, late.times, -4.0 / late.peak * late.acceleration, left=0.0, right=0.0)
+    np.testing.assert_allclose(found.ground_acceleration, expected, atol=1e-13)
+    before = times < 3.0
+    assert (found.relative_displacement.values[before] == 0.0).all()
+    # its samples are the points, where none are asked for
+    own = simulate(5.0, 0.4, excitation=late, amplitude=4.0)
+    np.testing.assert_array_equal(own.time.values[: late.times.size], late.times)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"points_per_cycle": 16}, "points_per_cycle: not allowed with a Record"),
+        ({"polarity": "both"}, "polarity: simulate takes one case"),
+        ({"frequency": 2.0}, "frequency: not allowed with a Record"),
+        ({"times": [2.0, 1.0]}, "times: must be one row of finite, increasing numbers"),
+    ],
+)
+def test_what_a_record_refuses(shaking: Record, given: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        simulate(5.0, 0.4, excitation=shaking, **given)
 
 
 ENDLESS = """

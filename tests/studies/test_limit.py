@@ -1,4 +1,4 @@
-"""The inverse of the sweep: limit amplitudes against the sweep itself, closed forms and dense scans."""
+"""The inverse of the sweep: limit amplitudes against the sweep itself, closed forms, dense scans and scaling laws."""
 
 import math
 from pathlib import Path
@@ -10,37 +10,33 @@ import xarray as xr
 from scipy.optimize import brentq
 
 import slipsweep
-from slipsweep.errors import InputError
-from slipsweep.model.variables import LimitStatus, SlidingMode, Validity
+from slipsweep import InputError, Mendez, Record, SlidingMode, Validity, limit_amplitude, sweep
+from slipsweep.model.variables import RECORD_COUNTS, LimitStatus
 from tests.support.cases import choices
 from tests.support.commands import command
 from tests.support.made_up_records import made
-
-OPTIONS: list[dict[str, Any]] = [
-    {},
-    {"rise": "literal"},
-    {"recoupling": "integrate"},
-    {"model": "newmark"},
-    {"yield_acceleration": 0.6},
-]
 
 
 def sweep_at(amplitude: xr.DataArray, inputs: dict[str, Any], **options: Any) -> xr.DataArray:
     given: dict[str, Any] = {
         name: xr.DataArray(values, dims=name) if np.ndim(values) else values for name, values in inputs.items()
     }
-    return slipsweep.sweep(
+    return sweep(
         **choices(
             amplitude=amplitude.fillna(0.0), **given, solver="cycle", variables=["permanent_displacement"], **options
         )
     ).permanent_displacement
 
 
-@pytest.mark.parametrize("options", OPTIONS, ids=str)
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"rise": "literal"}, {"recoupling": "integrate"}, {"model": "newmark"}, {"yield_acceleration": 0.6}],
+    ids=str,
+)
 def test_inverse_of_sweep_to_the_last_bit(options: dict[str, Any]) -> None:
     inputs: dict[str, Any] = {"theta": [0.0, 6.0, 14.0], "mu_s": [0.2, 0.38, 0.7, 1.2], "frequency": [0.3, 1.0, 7.0]}
     displacement = [1e-3, 0.05, 0.8]
-    limits = slipsweep.limit_amplitude(displacement, **choices(**inputs, **options))
+    limits = limit_amplitude(displacement, **choices(**inputs, **options))
     assert limits.limit_amplitude.dims == ("theta", "mu_s", "frequency", "displacement")
     found = limits.limit_amplitude.notnull()
     assert found.mean() > 0.5
@@ -58,6 +54,7 @@ def test_inverse_of_sweep_to_the_last_bit(options: dict[str, Any]) -> None:
 def test_newmark_closed_form() -> None:
     """One pulse of Newmark's block, solved by Brent's method on the classical closed form."""
     yielded, omega, g = 1.5, 2 * math.pi * 2.0, 9.81
+    block: dict[str, Any] = {"yield_acceleration": yielded, "model": "newmark", "excitation": slipsweep.Sine(cycles=1)}
 
     def displacement(amplitude: float) -> float:
         start = math.asin(yielded / amplitude)
@@ -72,16 +69,7 @@ def test_newmark_closed_form() -> None:
 
     for target in (1e-4, 0.004, 0.02):
         expected = brentq(lambda a, target=target: displacement(a) - target, yielded * 1.0001, 5 * g, xtol=1e-14)
-        limits = slipsweep.limit_amplitude(
-            target,
-            3,
-            0.5,
-            2.0,
-            yield_acceleration=yielded,
-            maximum_amplitude=5 * g,
-            model="newmark",
-            excitation=slipsweep.Sine(cycles=1),
-        )
+        limits = limit_amplitude(target, 3, 0.5, 2.0, maximum_amplitude=5 * g, **block)
         assert limits.limit_amplitude.item() == pytest.approx(expected, rel=1e-10)
         assert limits.limit_status.item() == LimitStatus.REACHED
 
@@ -89,10 +77,10 @@ def test_newmark_closed_form() -> None:
 def test_target_in_the_jump_of_the_mode_limit() -> None:
     limit = slipsweep.friction_parameters(5, 0.3, 1.0).limiting_acceleration.item()
     amplitudes = np.concatenate([np.linspace(2.0, limit, 20_001), [np.nextafter(limit, np.inf)]])
-    moved = slipsweep.sweep(5, 0.3, amplitudes, 2.0).permanent_displacement.values
+    moved = sweep(5, 0.3, amplitudes, 2.0).permanent_displacement.values
     below, above = moved[:-1].max(), moved[-1]
     assert above > 1.5 * below
-    limits = slipsweep.limit_amplitude(np.linspace(below * 1.001, above * 0.999, 5), 5, 0.3, 2.0)
+    limits = limit_amplitude(np.linspace(below * 1.001, above * 0.999, 5), 5, 0.3, 2.0)
     np.testing.assert_array_equal(limits.limit_amplitude, np.nextafter(limit, np.inf))
     assert (limits.limit_status == LimitStatus.AT_MODE_JUMP).all()
     assert (limits.sliding_mode == SlidingMode.CONTINUOUS).all()
@@ -104,9 +92,9 @@ def test_gap_in_validity() -> None:
     limit = slipsweep.friction_parameters(10, 1.2, 1.0, yield_acceleration=4.0).limiting_acceleration.item()
     edge = limit / math.sqrt(1.2)
     amplitudes = np.linspace(4.0, edge * (1 - 1e-12), 20_001)
-    below = slipsweep.sweep(**choices(amplitude=amplitudes, **given)).permanent_displacement.max().item()
-    assert slipsweep.sweep(**choices(amplitude=edge * (1 + 1e-9), **given)).permanent_displacement.isnull()
-    limits = slipsweep.limit_amplitude([below * 0.5, below * 1.001], **choices(**given))
+    below = sweep(**choices(amplitude=amplitudes, **given)).permanent_displacement.max().item()
+    assert sweep(**choices(amplitude=edge * (1 + 1e-9), **given)).permanent_displacement.isnull()
+    limits = limit_amplitude([below * 0.5, below * 1.001], **choices(**given))
     assert limits.limit_amplitude[0].item() < edge
     assert limits.limit_amplitude[1].item() == np.nextafter(limit, np.inf)
     assert limits.limit_status[1].item() == LimitStatus.AFTER_GAP
@@ -122,9 +110,9 @@ def test_smallest_amplitude_of_a_dense_scan() -> None:
         (2, 0.4, {"rise": "literal"}),
     ]
     for theta, mu_s, options in cases:
-        moved = slipsweep.sweep(theta, mu_s, amplitudes, 1.5, **choices(**options)).permanent_displacement.values
+        moved = sweep(theta, mu_s, amplitudes, 1.5, **choices(**options)).permanent_displacement.values
         targets = np.geomspace(1e-4, np.nanmax(moved), 60)[:-1]
-        limits = slipsweep.limit_amplitude(targets, theta, mu_s, 1.5, **choices(**options)).limit_amplitude.values
+        limits = limit_amplitude(targets, theta, mu_s, 1.5, **choices(**options)).limit_amplitude.values
         first = amplitudes[(moved[:, np.newaxis] >= targets).argmax(axis=0)]
         assert ((first - limits >= 0) & (first - limits <= step)).all()
 
@@ -132,17 +120,17 @@ def test_smallest_amplitude_of_a_dense_scan() -> None:
 def test_beside_a_gap_every_displacement_is_reached() -> None:
     """With the literal rise Kd comes to 0 at the gap's edge, and the run-out v²/(2 g Kd) beyond all bounds."""
     given: dict[str, Any] = {"theta": 0, "mu_s": [0.3, 0.4, 0.6], "yield_acceleration": 1.0, "frequency": 1.0}
-    given["model"] = slipsweep.Mendez("literal")
-    limits = slipsweep.limit_amplitude([1e3, 1e6, 1e9], **given).transpose("mu_s", "displacement")
+    given["model"] = Mendez("literal")
+    limits = limit_amplitude([1e3, 1e6, 1e9], **given).transpose("mu_s", "displacement")
     assert (limits.limit_status[:, 2] == LimitStatus.AFTER_GAP).all()
     assert (limits.permanent_displacement >= limits.displacement).all()
     edges = limits.limit_amplitude.values[:, 2]
     assert (np.ptp(limits.limit_amplitude.values, axis=1) <= 1e-9 * edges).all()
     for mu_s, edge in zip(given["mu_s"], edges, strict=True):
         one = given | {"mu_s": mu_s}
-        below = slipsweep.sweep(amplitude=np.nextafter(edge, 0), **one)
-        assert int(below.validity) & slipsweep.Validity.KD_NOT_POSITIVE
-        assert slipsweep.sweep(amplitude=edge * (1 + 1e-3), **one).permanent_displacement < 1e5
+        below = sweep(amplitude=np.nextafter(edge, 0), **one)
+        assert int(below.validity) & Validity.KD_NOT_POSITIVE
+        assert sweep(amplitude=edge * (1 + 1e-3), **one).permanent_displacement < 1e5
 
 
 def test_narrow_peaks_where_blocks_do_not_recouple() -> None:
@@ -160,9 +148,9 @@ def test_narrow_peaks_where_blocks_do_not_recouple() -> None:
     columns = zip(names, zip(*rows, strict=True), strict=True)
     given: dict[str, Any] = {name: xr.DataArray([*values], dims="case") for name, values in columns}
     target = given.pop("displacement")
-    limits = slipsweep.limit_amplitude(displacement=target, frequency=1.0, **given).limit_amplitude
+    limits = limit_amplitude(displacement=target, frequency=1.0, **given).limit_amplitude
     amplitudes = np.geomspace(0.05, 6.0, 20_001)
-    moved = slipsweep.sweep(amplitude=amplitudes, frequency=1.0, **given).permanent_displacement
+    moved = sweep(amplitude=amplitudes, frequency=1.0, **given).permanent_displacement
     first = amplitudes[(moved >= target).transpose("case", "amplitude").values.argmax(axis=1)]
     assert ((limits <= first) & (limits > 0.9 * first)).all()
 
@@ -172,40 +160,36 @@ def test_peaks_of_a_record_where_slips_become_one(seed: int, displacement: float
     """The limit is never above the first of 20 000 amplitudes that reaches the target."""
     one = made(seed)
     given: dict[str, Any] = {"theta": one.theta, "mu_s": one.mu_s, **choices(**one.given, excitation=one.record)}
-    limit = slipsweep.limit_amplitude(displacement, **given).limit_amplitude.item()
+    limit = limit_amplitude(displacement, **given).limit_amplitude.item()
     amplitudes = np.geomspace(0.5 * limit, 1.5 * limit, 20_001)
-    moved = slipsweep.sweep(amplitude=amplitudes, **given).permanent_displacement.values
+    moved = sweep(amplitude=amplitudes, **given).permanent_displacement.values
     first = amplitudes[(moved >= displacement).argmax()]
     assert 0.999 * first < limit <= first
 
 
 def test_statuses_without_a_limit() -> None:
-    limits = slipsweep.limit_amplitude(1e6, [0, 20], 0.3, 1.0)
+    limits = limit_amplitude(1e6, [0, 20], 0.3, 1.0)
     np.testing.assert_array_equal(limits.limit_status, [LimitStatus.NOT_REACHED, LimitStatus.INVALID])
     assert limits.limit_amplitude.isnull().all()
     assert limits.permanent_displacement.isnull().all()
     assert (limits.sliding_mode == SlidingMode.MISSING).all()
     assert limits.validity[1].item() & Validity.STATICALLY_UNSTABLE
-    assert slipsweep.limit_amplitude("50mm", 5, 0.3, 1.0).displacement == 0.05
+    assert limit_amplitude("50mm", 5, 0.3, 1.0).displacement == 0.05
     # never beyond the end of the search: yield lies above it
-    assert slipsweep.limit_amplitude(0.01, 0, 0.5, 1.0, maximum_amplitude=1.0).limit_status == LimitStatus.NOT_REACHED
+    assert limit_amplitude(0.01, 0, 0.5, 1.0, maximum_amplitude=1.0).limit_status == LimitStatus.NOT_REACHED
 
 
 def test_zipped_inputs_and_slabs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Cells that share a dimension, scanned in slabs of a few, give the bits of single calls."""
-    case: dict[str, Any] = {
-        "displacement": [0.01, 0.2, 0.05],
-        "theta": [2.0, 6.0, 9.0],
-        "mu_s": [0.3, 0.5, 0.4],
-        "frequency": [1.0, 2.0, 0.7],
-    }
+    case = {"displacement": [0.01, 0.2, 0.05], "theta": [2.0, 6.0, 9.0], "mu_s": [0.3, 0.5, 0.4]}
+    case["frequency"] = [1.0, 2.0, 0.7]
     monkeypatch.setattr("slipsweep.studies.limits.SCANNED", 1024)
     zipped: dict[str, Any] = {name: xr.DataArray(row, dims="case") for name, row in case.items()}
-    together = slipsweep.limit_amplitude(**choices(**zipped))
+    together = limit_amplitude(**choices(**zipped))
     assert together.limit_amplitude.dims == ("case",)
     for number in range(3):
         single: dict[str, Any] = {name: row[number] for name, row in case.items()}
-        alone = slipsweep.limit_amplitude(**choices(**single))
+        alone = limit_amplitude(**choices(**single))
         for name in alone.data_vars:
             np.testing.assert_array_equal(together[name][number], alone[name])
 
@@ -222,23 +206,110 @@ def test_zipped_inputs_and_slabs(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_refusals(given: dict[str, Any], message: str) -> None:
     asked: dict[str, Any] = {"displacement": 0.05, "theta": 5, "mu_s": 0.4, "frequency": 1.0, **given}
     with pytest.raises(InputError) as refused:
-        slipsweep.limit_amplitude(**choices(**asked))
+        limit_amplitude(**choices(**asked))
     assert message in str(refused.value)
 
 
-# ------------------------------------------------------------------------- command line
+@pytest.fixture(scope="module")
+def shaking() -> Record:
+    """Some pulses of different sizes and both signs."""
+    times = np.arange(0.0, 8.0, 0.02)
+    wave = np.sin(2 * np.pi * 1.1 * times) + 0.7 * np.sin(2 * np.pi * 2.7 * times + 1.0)
+    return Record(times, wave * times**2 * np.exp(-1.2 * times))
+
+
+def case_of(seed: int) -> dict[str, Any]:
+    """A case of any kind, by its number."""
+    rng = np.random.default_rng(seed)
+    models: list[Any] = [
+        "mendez",
+        Mendez(rise="literal"),
+        Mendez(recoupling="integrate"),
+        "newmark",
+    ]
+    given: dict[str, Any] = {
+        "theta": rng.uniform(0, 15),
+        "mu_s": rng.uniform(0.3, 0.8),
+        "time_scale": rng.uniform(0.3, 3),
+        "polarity": int(rng.choice([1, -1])),
+        "model": models[rng.integers(4)],
+    }
+    return given | ({"yield_acceleration": rng.uniform(0.1, 2)} if rng.random() < 0.5 else {})
+
+
+def test_limits_are_exact_and_the_first(shaking: Record) -> None:
+    """The displacement is reached there, not at the number before, nor at any of a dense scan below."""
+    seen = set()
+    for seed in range(24):
+        given = case_of(seed)
+        wanted = 10.0 ** np.random.default_rng(seed).uniform(-4, 0)
+        found = limit_amplitude(wanted, excitation=shaking, **given)
+        seen.add(LimitStatus(found.limit_status.item()))
+        if np.isnan(found.limit_amplitude):
+            assert found.limit_status in (LimitStatus.NOT_REACHED, LimitStatus.INVALID)
+            scan = sweep(excitation=shaking, **given, amplitude=np.linspace(0.01, 5 * 9.81, 4000))
+            assert not (scan.permanent_displacement >= wanted).any()
+            continue
+        limit = found.limit_amplitude.item()
+        names = ("permanent_displacement", "validity", *RECORD_COUNTS)
+        at = sweep(excitation=shaking, **given, amplitude=[np.nextafter(limit, 0.0), limit], variables=names)
+        below, above = at.permanent_displacement.values
+        assert above >= wanted
+        assert not below >= wanted
+        scan = sweep(excitation=shaking, **given, amplitude=np.linspace(0.2 * limit, limit, 4000)[:-1])
+        assert not (scan.permanent_displacement >= wanted).any(), seed
+        for name in names:
+            assert found[name].item() == at[name].values[1]
+        pulses = [at[name].values for name in ("stick_slip_pulses", "continuous_pulses")]
+        jumps = above - below > 1e-6 * above
+        if found.limit_status == LimitStatus.AT_MODE_JUMP:
+            assert jumps
+            assert any(before != after for before, after in pulses)
+        elif found.limit_status == LimitStatus.REACHED:
+            assert not jumps
+    assert {LimitStatus.REACHED, LimitStatus.AT_MODE_JUMP} <= seen
+
+
+def test_time_and_sign_only_scale(shaking: Record) -> None:
+    """u ∝ time_scale²: a displacement at twice the time is four of them; a record turned is the other sign."""
+    block: dict[str, Any] = {"theta": [0.0, 8.0], "mu_s": [0.35, 0.6]}
+    wanted = np.array([0.002, 0.05])
+    one = limit_amplitude(wanted, **block, excitation=shaking, polarity="both")
+    slow = limit_amplitude(4.0 * wanted, **block, excitation=shaking, polarity="both", time_scale=2.0)
+    np.testing.assert_array_equal(one.limit_amplitude, slow.limit_amplitude)
+    np.testing.assert_array_equal(4.0 * one.permanent_displacement, slow.permanent_displacement)
+    turned = limit_amplitude(wanted, **block, excitation=Record(shaking.times, -shaking.acceleration), polarity=[-1, 1])
+    np.testing.assert_array_equal(one.limit_amplitude, turned.limit_amplitude)
+    assert one.limit_amplitude.dims == ("theta", "mu_s", "polarity", "displacement")
+    # the strength of the record itself plays no part
+    strong = limit_amplitude(
+        wanted, **block, excitation=Record(shaking.times, 8.0 * shaking.acceleration), polarity="both"
+    )
+    np.testing.assert_array_equal(one.limit_amplitude, strong.limit_amplitude)
+
+
+def test_no_limit_and_what_is_refused(shaking: Record) -> None:
+    weak = limit_amplitude(0.1, 5.0, [0.05, 0.4], excitation=shaking, maximum_amplitude=1.0)
+    assert list(weak.limit_status.values) == [LimitStatus.INVALID, LimitStatus.NOT_REACHED]
+    assert (weak.stick_slip_pulses.values == -1).all()
+    with pytest.raises(InputError, match="frequency: not allowed with a Record"):
+        limit_amplitude(0.1, 5.0, 0.4, 1.0, excitation=shaking)
+    with pytest.raises(InputError, match="time_scale: not allowed with a waveform"):
+        limit_amplitude(0.1, 5.0, 0.4, 1.0, time_scale=2.0)
+    with pytest.raises(InputError, match="frequency: must be given"):
+        limit_amplitude(0.1, 5.0, 0.4)
+    with pytest.raises(InputError, match="has no acceleration to scale"):
+        limit_amplitude(0.1, 5.0, 0.4, excitation=Record.sampled([0.0, 0.0, 0.0], 0.1))
+
 
 SWEEP = """
 [model]
 friction = "newmark"
-[axes.theta]
-values = [0, 5]
-[axes.mu_s]
-values = [0.3, 0.5]
-[axes.amplitude]
-values = [1, 4]
-[axes.frequency]
-values = [1, 2, 4]
+[axes]
+theta.values = [0, 5]
+mu_s.values = [0.3, 0.5]
+amplitude.values = [1, 4]
+frequency.values = [1, 2, 4]
 [excitation]
 cycles = 3
 """
@@ -248,7 +319,7 @@ def test_command_on_sweep_and_on_result(tmp_path: Path) -> None:
     (tmp_path / "small.toml").write_text(SWEEP)
     assert command(tmp_path, "run", "small.toml", "-q").returncode == 0
     # the file holds what `limit_amplitude` gives with the sweep's own options
-    expected = slipsweep.limit_amplitude(
+    expected = limit_amplitude(
         [0.02, 0.05], [0, 5], [0.3, 0.5], [1, 2, 4], model="newmark", excitation=slipsweep.Sine(cycles=3)
     )
     for source, result in (("small.toml", "one.nc"), ("small.nc", "two.nc")):

@@ -1,6 +1,5 @@
 """Uncertain inputs under a record: against sweeps of the draws one by one, and in sweep files."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,9 +8,8 @@ import xarray as xr
 
 from slipsweep import InputError, Record, Suite, sample, sweep
 from slipsweep.model.variables import Validity
-from slipsweep.studies.sampling import Sampling
+from tests.studies.test_uncertainty import assert_statistics, sampling_of
 
-SYNTHETIC = Path(__file__).parents[2] / "sweeps" / "data" / "synthetic.csv"
 SAMPLES = 64
 THRESHOLDS = (0.001, 0.02)
 
@@ -27,10 +25,8 @@ def shaking() -> Record:
 
 def drawn(uncertain: dict[str, Any]) -> dict[str, xr.DataArray]:
     """The draws along a dimension."""
-    sampling = Sampling(
-        uncertain, samples=SAMPLES, method="sobol", seed=0, quantiles=[0.5], thresholds=[0.1], correlation=(), g=9.81
-    )
-    return {name: xr.DataArray(values, dims="draw") for name, values in sampling.draws.items()}
+    draws = sampling_of(uncertain, samples=SAMPLES).draws
+    return {name: xr.DataArray(values, dims="draw") for name, values in draws.items()}
 
 
 NORMAL = {"distribution": "norm", "loc": 0.45, "scale": 0.04}
@@ -87,16 +83,7 @@ def test_statistics_are_those_of_the_draws(shaking: Record, name: str) -> None:
     moved = swept.permanent_displacement
     assert (moved > 0.0).any()
     assert found.displacement_quantile.dims[:-1] == tuple(dim for dim in moved.dims if dim != "draw")
-    expected = moved.quantile([0.1, 0.5, 0.9], dim="draw").transpose(..., "quantile")
-    np.testing.assert_allclose(found.displacement_quantile, expected, rtol=1e-11, atol=1e-15)
-    np.testing.assert_allclose(found.mean_displacement, moved.mean("draw"), rtol=1e-11)
-    for at, threshold in enumerate(THRESHOLDS):
-        np.testing.assert_array_equal(found.exceedance_probability[..., at], (moved > threshold).mean("draw"))
-    # no flag depends on the time scale
-    first = swept if "time_scale" in found.flag_share.dims else swept.isel(time_scale=0, missing_dims="ignore")
-    for at, flag in enumerate(Validity):
-        share = ((first.validity & int(flag)) != 0).mean("draw")
-        np.testing.assert_array_equal(found.flag_share[..., at], share)
+    assert_statistics(found, swept, "draw", 1e-11)
 
 
 @pytest.mark.parametrize(

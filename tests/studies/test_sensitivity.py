@@ -13,20 +13,11 @@ from slipsweep.cli import main
 from slipsweep.errors import InputError
 from slipsweep.model.variables import SensitivityStatus
 from slipsweep.studies.sampling import MOST_SAMPLES, RESAMPLES, Sampling, sobol_indices
-
-FACTOR: dict[str, Any] = {"distribution": "lognorm", "s": 0.3, "kind": "factor"}
+from tests.studies.test_uncertainty import FACTOR, sampling_of
 
 #: Uniform from -π to π.
 ANGLE: dict[str, Any] = {"distribution": "uniform", "loc": -np.pi, "scale": 2 * np.pi}
 ANGLES = {"theta": ANGLE, "mu_s": ANGLE, "amplitude": ANGLE}
-
-
-def sampling_of(uncertain: dict[str, Any], **options: Any) -> Sampling:
-    settings: dict[str, Any] = {
-        "samples": 4096, "method": "sobol", "seed": 0, "quantiles": 0.5, "thresholds": 0.1, "correlation": (),
-        "sensitivity": True, "g": 9.81,
-    }  # fmt: skip
-    return Sampling(uncertain, **{**settings, **options})
 
 
 def ishigami(draws: Any) -> np.ndarray:
@@ -49,12 +40,9 @@ def reduced(sampling: Sampling, values: np.ndarray) -> dict[str, np.ndarray]:
     return {name: one[0] for name, one in found.items()}
 
 
-# ----------------------------------------------------------------------------- closed forms
-
-
 @pytest.mark.parametrize("seed", [0, 1])
 def test_ishigamis_function(seed: int) -> None:
-    sampling = sampling_of(ANGLES, samples=2**14, seed=seed)
+    sampling = sampling_of(ANGLES, sensitivity=True, samples=2**14, seed=seed)
     found = reduced(sampling, ishigami(sampling.draws))
     for name, exact in zip(("first_order", "total"), closed_form(), strict=True):
         np.testing.assert_allclose(found[f"{name}_index"], exact, rtol=0.01, atol=0.003)
@@ -64,7 +52,7 @@ def test_ishigamis_function(seed: int) -> None:
 
 def test_estimates_are_those_of_scipy() -> None:
     """The estimators of scipy.stats.sobol_indices, and its bootstrap's percentiles but for what chance does to them."""
-    sampling = sampling_of(ANGLES, samples=512)
+    sampling = sampling_of(ANGLES, sensitivity=True, samples=512)
     runs = ishigami(sampling.draws).reshape(5, 1, 512)
     found = reduced(sampling, runs.ravel())
     theirs = stats.sobol_indices(func={"f_A": runs[0], "f_B": runs[1], "f_AB": runs[2:]}, n=512)
@@ -91,7 +79,7 @@ def test_estimates_are_those_of_scipy() -> None:
 def test_intervals_of_random_numbers_hold_the_truth_as_often_as_they_say() -> None:
     held = []
     for seed in range(60):
-        sampling = sampling_of(ANGLES, samples=2048, seed=seed, method="random")
+        sampling = sampling_of(ANGLES, sensitivity=True, samples=2048, seed=seed, method="random")
         found = reduced(sampling, ishigami(sampling.draws))
         for name, exact in zip(("first_order", "total"), closed_form(), strict=True):
             low, high = found[f"{name}_interval"]
@@ -118,17 +106,9 @@ def test_a_product_of_two_inputs() -> None:
 
 def test_an_input_without_effect_has_no_index() -> None:
     """λ plays no part where the yield acceleration governs: not to the last bit."""
-    found = slipsweep.sample(
-        theta=5.0,
-        mu_s=0.4,
-        amplitude=4.0,
-        frequency=1.0,
-        yield_acceleration=2.5,
-        uncertain={"decay_rate": FACTOR, "amplitude": {**FACTOR, "s": 0.05}},
-        decay_rate=8.0,
-        sensitivity=True,
-        samples=1024,
-    )
+    block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.4, "yield_acceleration": 2.5, "decay_rate": 8.0}
+    uncertain = {"decay_rate": FACTOR, "amplitude": {**FACTOR, "s": 0.05}}
+    found = slipsweep.sample(**block, amplitude=4.0, frequency=1.0, uncertain=uncertain, sensitivity=True, samples=1024)
     assert found.flag_share.sel(flag=int(slipsweep.Validity.YIELD_GOVERNS)) == 1.0
     assert found.total_index.sel(input="decay_rate") == 0.0
     assert found.first_order_index.sel(input="decay_rate") == 0.0
@@ -139,7 +119,7 @@ def test_an_input_without_effect_has_no_index() -> None:
 def test_correlated_inputs_are_one() -> None:
     uncertain = {"mu_s": {**FACTOR, "s": 0.05}, "amplitude": FACTOR, "decay_rate": FACTOR, "delta_mu": FACTOR}
     pairs = [("delta_mu", "decay_rate", 0.9), ("mu_s", "delta_mu", 0.1)]
-    sampling = sampling_of(uncertain, correlation=pairs, samples=4096)
+    sampling = sampling_of(uncertain, sensitivity=True, correlation=pairs)
     assert sampling.independent == (("mu_s", "decay_rate", "delta_mu"), ("amplitude",))
     drawn = sampling.draws
     draws = {name: values.reshape(4, -1) for name, values in drawn.items()}
@@ -152,8 +132,6 @@ def test_correlated_inputs_are_one() -> None:
     for index in ("first_order_index", "total_index"):
         np.testing.assert_allclose(found[index], [share, 1 - share], rtol=0.02)
 
-
-# --------------------------------------------------------------------- the grid, and no value
 
 CASE: dict[str, Any] = {"theta": [0.0, 15.0], "amplitude": [0.5, 4.0, 8.0], "samples": 128, "sensitivity": True}
 
@@ -182,29 +160,19 @@ def test_where_there_are_no_indices_the_status_says_why() -> None:
 )
 def test_what_is_refused(options: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        sampling_of(ANGLES, **options)
+        sampling_of(ANGLES, **{"sensitivity": True, **options})
 
-
-# -------------------------------------------------------------------- files
 
 SWEEP = """
-[axes.theta]
-values = [0, 5]
-[axes.amplitude]
-values = [0.2, 2, 4, 6, 8]
-[axes.frequency]
-values = [1, 2]
+[axes]
+theta.values = [0, 5]
+amplitude.values = [0.2, 2, 4, 6, 8]
+frequency.values = [1, 2]
 [uncertainty]
 samples = 256
 sensitivity = true
-[uncertainty.mu_s]
-distribution = "uniform"
-loc = 0.35
-scale = 0.1
-[uncertainty.amplitude]
-kind = "factor"
-distribution = "lognorm"
-s = 0.3
+mu_s = { distribution = "uniform", loc = 0.35, scale = 0.1 }
+amplitude = { kind = "factor", distribution = "lognorm", s = 0.3 }
 """
 
 

@@ -10,14 +10,12 @@ import xarray as xr
 from slipsweep import InputError, Suite, read_suite, sweep
 from slipsweep.files import running as store
 from slipsweep.files import spec
-from slipsweep.files.jobs import limit_job, sweep_job
+from slipsweep.files.jobs import limit_job
 from slipsweep.files.motions import read_embedded
 from slipsweep.files.opening import read_result
 from slipsweep.model.variables import DEFAULT_SUITE_RESULTS, MOTION_COORDINATES
-from tests.studies.test_record_sweeps import assert_same_data
+from tests.studies.test_record_sweeps import assert_same_data, run
 from tests.support.commands import command
-
-SWEEPS = Path(__file__).parents[2] / "sweeps"
 
 SWEEP = """
 [excitation]
@@ -25,33 +23,24 @@ records = ["motions/*.csv"]
 units = "g"
 baseline = "mean"
 polarity = "both"
-[axes.theta]
-values = [0, 5, 25]
-[axes.mu_s]
-values = [0.1, 0.3]
-[axes.amplitude]
-values = [0.3, 0.6]
-units = "g"
-[axes.time_scale]
-values = [1, 2]
+[axes]
+theta.values = [0, 5, 25]
+mu_s.values = [0.1, 0.3]
+amplitude = { values = [0.3, 0.6], units = "g" }
+time_scale.values = [1, 2]
 """
 
 SAMPLES = """
 [excitation]
 records = "motions"
 units = "g"
-[axes.theta]
-values = [0, 5]
-[axes.arias_intensity]
-values = [1, 4]
-[axes.time_scale]
-values = [1, 2]
+[axes]
+theta.values = [0, 5]
+arias_intensity.values = [1, 4]
+time_scale.values = [1, 2]
 [uncertainty]
 samples = 32
-[uncertainty.mu_s]
-distribution = "uniform"
-loc = 0.1
-scale = 0.2
+mu_s = { distribution = "uniform", loc = 0.1, scale = 0.2 }
 """
 
 
@@ -70,13 +59,6 @@ def folder(tmp_path: Path) -> Path:
         write_motion(folder / "motions" / f"m{seed}.csv", seed, count, interval)
     (folder / "a.toml").write_text(SWEEP)
     return folder
-
-
-def run(source: Path, path: Path, **options: Any) -> store.Report:
-    return store.run(sweep_job(spec.load(source)), path, command="slipsweep run a.toml", **options)
-
-
-# ---------------------------------------------------------------------------- what is written
 
 
 def test_a_sweep_file_gives_what_python_gives(folder: Path) -> None:
@@ -109,16 +91,13 @@ def test_a_result_repeats_itself_without_the_motions(folder: Path, text: str) ->
         write_motion(folder / "motions" / "m3.csv", 4, 140, 0.01)
         pairs = '[["motions/m0.csv", "motions/m3.csv"], ["motions/m1.csv", "motions/m1.csv"]]'
         text = SWEEP.replace('["motions/*.csv"]', pairs)
-        text += "[axes.azimuth]\nvalues = [0, 30, 90]\n"
+        text += "azimuth.values = [0, 30, 90]\n"
     (folder / "a.toml").write_text(text)
     run(folder / "a.toml", folder / "a.nc")
     for path in (folder / "motions").iterdir():
         path.unlink()
     run(folder / "a.nc", folder / "b.nc")
     assert_same_data(folder / "a.nc", folder / "b.nc")
-    with xr.open_dataset(folder / "a.nc") as one, xr.open_dataset(folder / "b.nc") as other:
-        names = {*one.attrs} - {"history"}
-        assert {name: one.attrs[name] for name in names} == {name: other.attrs[name] for name in names}
     assert spec.load(folder / "b.nc").recorded == spec.load(folder / "a.nc").recorded
 
 
@@ -131,9 +110,6 @@ def test_limits_of_a_suite(folder: Path) -> None:
     with xr.open_dataset(folder / "l.nc") as result:
         assert result.limit_amplitude.dims == ("theta", "mu_s", "time_scale", "polarity", "motion", "displacement")
         assert result.limit_amplitude.notnull().any()
-
-
-# --------------------------------------------------------------------------------- commands
 
 
 def test_info_and_export_show_the_motions(folder: Path) -> None:
@@ -168,8 +144,8 @@ def test_info_and_export_show_the_motions(folder: Path) -> None:
         ('["motions/*.csv"]', '["motions/*.AT2"]', r"excitation\.records: motions/\*\.AT2: no file fits"),
         ('["motions/*.csv"]', '["motions/*.csv"]\npairs = ["_NS"]', "excitation.pairs = "),
         ('records = ["motions/*.csv"]', 'record = "motions/m0.csv"\npairs = ["a", "b"]', "excitation.pairs: only"),
-        ("[axes.time_scale]", "[axes.frequency]", "frequency: not allowed with a Suite"),
-        ("[axes.time_scale]", "[axes.pgv]", "amplitude, pgv: must not both be given"),
+        ("time_scale.values", "frequency.values", "frequency: not allowed with a Suite"),
+        ("time_scale.values", "pgv.values", "amplitude, pgv: must not both be given"),
     ],
 )
 def test_what_sweep_files_refuse(folder: Path, before: str, after: str, message: str) -> None:

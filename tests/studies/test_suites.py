@@ -34,17 +34,13 @@ def test_each_motion_does_what_it_does_alone(model: str, strength: str) -> None:
     given: dict[str, Any] = {strength: np.array([0.3, 0.9]) * {"amplitude": 6.0, "scale": 2.0}.get(strength, 1.0)}
     given |= {"time_scale": [1, 2.5], "polarity": "both", "model": model, "variables": tuple(RECORD_RESULTS)}
     found = sweep([0, 5], [0.1, 0.3], excitation=SUITE, **given)
-    assert found.permanent_displacement.dims == ("theta", "mu_s", *_order(strength), "polarity", "motion")
+    assert found.permanent_displacement.dims == ("theta", "mu_s", strength, "time_scale", "polarity", "motion")
     assert found.motion.values.tolist() == ["noise1", "noise2", "noise3"]
     assert float(found.permanent_displacement.max()) > 0.0
     for at, motion in enumerate(MOTIONS):
         alone = sweep([0, 5], [0.1, 0.3], excitation=motion, **given)
         for name in RECORD_RESULTS:
             np.testing.assert_array_equal(found[name].isel(motion=at), alone[name], err_msg=name)
-
-
-def _order(strength: str) -> tuple[str, str]:
-    return strength, "time_scale"
 
 
 def test_the_factor_of_each_motion_makes_the_strength() -> None:
@@ -101,9 +97,6 @@ def test_lazy_results_and_parts_have_the_same_bits() -> None:
     )
 
 
-# ------------------------------------------------------------------------------------- pairs
-
-
 def test_an_azimuth_of_pairs_is_the_component_there() -> None:
     azimuths = [0.0, 30.0, 90.0, 210.0]
     found = sweep([0, 5], 0.2, excitation=PAIRS, azimuth=azimuths, amplitude=[3.0, 6.0])
@@ -118,9 +111,6 @@ def test_an_azimuth_of_pairs_is_the_component_there() -> None:
             np.testing.assert_array_equal(found.permanent_displacement.isel(where), alone.permanent_displacement)
             assert float(found.motion_pga.isel(where)) == component.peak
             assert float(found.motion_mean_period.isel(where)) == intensity_measures(component)["mean_period"]
-
-
-# -------------------------------------------------------------------------- limits and samples
 
 
 def test_limits_are_those_of_each_motion() -> None:
@@ -150,14 +140,9 @@ def test_samples_are_those_of_each_motion(strength: str, time_scale: Any) -> Non
             np.testing.assert_allclose(found[name].isel(motion=at), alone[name], rtol=1e-14, err_msg=str(name))
 
 
-# --------------------------------------------------------------------------------- what is refused
-
-
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"amplitude": 2, "scale": 1}, "amplitude, scale: must not both be given"),
-        ({"frequency": 1}, "frequency: not allowed with a Suite"),
         ({"excitation": PAIRS}, "azimuth: must be given with pairs"),
         ({"pgv": -1}, "pgv = -1: must be"),
         ({"variables": ["sliding_mode"]}, "variables = 'sliding_mode'"),

@@ -114,7 +114,7 @@ def calibrate(
     block = options.in_own_units({"theta": theta, "phi": phi}, model.g) | {"mu_s": mu_s}
     paths = common.check_outputs(output, (".nc", ".toml", *FIGURES), overwrite, tests)
     from slipsweep.studies.calibration import calibrate as calibrated
-    from slipsweep.studies.findings import sweep_file_text
+    from slipsweep.studies.calibration import sweep_file_text
 
     table = calibrated(tests, **block, model=model, **_removed(offset, drift), cycles=cycles)
     text = sweep_file_text(table.attrs["model_table"], table.attrs["uncertainty_table"])

@@ -78,9 +78,9 @@ def sweep(
 
     The model is that of Mendez, Romo and Botero [1]_, or Newmark's block.
 
-    A scalar becomes a scalar coordinate, a 1-D array a dimension of the parameter's own
-    name; the grid is the outer product of all of them.  A DataArray keeps its dimensions,
-    so that several on one shared dimension are combined value by value, not crossed.
+    A scalar becomes a scalar coordinate, a 1-D array a dimension of the parameter's own name; the grid is the outer
+    product of all of them.  A DataArray keeps its dimensions, so that several on one shared dimension are combined
+    value by value, not crossed.
 
     Parameters
     ----------
@@ -112,8 +112,7 @@ def sweep(
     time_scale : float, array or DataArray
         With a record: factor on its time, > 0; 2 makes it last twice as long.
     polarity : {1, -1}, list of these, or "both"
-        With a record: 1, positive recorded acceleration drives the block downslope; -1, negative
-        recorded acceleration does.
+        With a record: whether positive (1) or negative (-1) recorded acceleration drives the block downslope.
     azimuth : float, array or DataArray
         With a suite of pairs of components, of which it is needed: the direction of sliding, degrees from the first
         component towards the second, 0 to 360.
@@ -122,18 +121,17 @@ def sweep(
     yield_coefficient : float, array or DataArray, optional
         ky = Üy/g of Newmark's block, instead of `theta`, `mu_s` and `yield_acceleration`.
     decay_rate, delta_mu, minimum_friction : float, array or DataArray, optional
-        λ, Δμ and μmin where they are known; each replaces its estimate (Eqs. 6, 9-11), which under a
-        record every pulse has from its own peak.
+        λ, Δμ and μmin where they are known; each replaces its estimate (Eqs. 6, 9-11), which under a record every pulse
+        has from its own peak.
     structure_frequency : float, array or DataArray, optional
         Natural frequency of the sliding structure, Hz, for the `flexible_block` flag; not with a record.
     variables : sequence of str, optional
-        Results to compute: `permanent_displacement`, `peak_relative_velocity`,
-        `sliding_mode`, `validity` (these by default), `newmark_displacement` (of Newmark's block on the same cells,
-        with the same yield acceleration), the parameters of Eqs. 7-11, and `amplitude`.  Under a record
-        `permanent_displacement`, `peak_relative_velocity`, `number_of_slips` (that begin at rest),
-        `stick_slip_pulses` and `continuous_pulses` (by Eq. 7 with each pulse's own peak: an extension of
-        the paper's harmonic motion) and `validity`, these by default, `newmark_displacement`, and `motion_factor`, by
-        which the recorded acceleration is multiplied (under a suite by default, too).
+        Results to compute: `permanent_displacement`, `peak_relative_velocity`, `sliding_mode`, `validity` (these by
+        default), `newmark_displacement` (of Newmark's block on the same cells, with the same yield acceleration), the
+        parameters of Eqs. 7-11, and `amplitude`.  Under a record `sliding_mode` gives way to `number_of_slips` (that
+        begin at rest), `stick_slip_pulses` and `continuous_pulses` (by Eq. 7 with each pulse's own peak: an extension
+        of the paper's harmonic motion), the parameters and `amplitude` to `motion_factor`, by which the recorded
+        acceleration is multiplied (under a suite by default, too).
     chunks : int, tuple, dict or "auto", optional
         Chunks as dask takes them; the result is then lazy.  Do not divide the frequency.
     progress : callable, optional
@@ -142,10 +140,10 @@ def sweep(
     Returns
     -------
     Dataset
-        Dimensions theta, mu_s, amplitude, frequency, then others, `motion` last.  The parameters of
-        Eqs. 7-11 do not vary with frequency and have no such dimension.  A suite has its labels as `motion`, and the
-        file and the intensity measures of each motion, as it was recorded, as coordinates along it (``motion_pga``
-        and others: `slipsweep.motion.intensity`).
+        Dimensions theta, mu_s, amplitude, frequency, then others, `motion` last.  The parameters of Eqs. 7-11 do not
+        vary with frequency and have no such dimension.  A suite has its labels as `motion`, and the file and the
+        intensity measures of each motion, as it was recorded, as coordinates along it (``motion_pga`` and others:
+        `slipsweep.motion.intensity`).
 
     Raises
     ------
@@ -200,27 +198,22 @@ def friction_parameters(
     minimum_friction: Values | None = None,
     model: Model | str = "mendez",
 ) -> xr.Dataset:
-    """Friction parameters of the model over a grid.
-
-    They are those of Eqs. 7-11 of the paper (reference [1] of `sweep`), and λ.
+    """Friction parameters of the model over a grid: those of Eqs. 7-11 of the paper (reference [1] of `sweep`), and λ.
 
     Parameters
     ----------
-    theta, mu_s, amplitude : float, array or DataArray
-        Inclination (degrees), static friction coefficient and peak ground acceleration (m/s²), as in `sweep`.
-    phi : float, array or DataArray, optional
-        Friction angle, degrees, instead of `mu_s`.
+    theta, mu_s, amplitude, phi, model
+        Inclination (degrees), static friction coefficient, peak ground acceleration (m/s²), friction angle (degrees)
+        and friction law, as in `sweep`.
     yield_acceleration, decay_rate, delta_mu, minimum_friction : float, array or DataArray, optional
         Those that are known, as in `sweep`; each replaces its estimate.
-    model : Mendez, Newmark or str
-        As in `sweep`.
 
     Returns
     -------
     Dataset
-        `yield_acceleration`, `limiting_acceleration` (m/s²), `acceleration_ratio`,
-        `minimum_friction`, `delta_mu`, `decay_rate`, `sliding_mode`, and the part of
-        `validity` that is known before the motion.  A parameter that was given is a coordinate.
+        `yield_acceleration`, `limiting_acceleration` (m/s²), `acceleration_ratio`, `minimum_friction`, `delta_mu`,
+        `decay_rate`, `sliding_mode`, and the part of `validity` that is known before the motion.  A parameter that was
+        given is a coordinate.
 
     Raises
     ------

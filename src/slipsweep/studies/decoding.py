@@ -13,21 +13,21 @@ _KNOWN = {(flag.name or "").lower(): flag for flag in Validity}
 def flags(data: xr.Dataset | xr.DataArray) -> xr.Dataset:
     """Decode a bit mask: one boolean variable per flag.
 
-    Names and bits come from the attributes `flag_meanings` and `flag_masks` (CF conventions, 3.5 [1]_),
-    so that files of any version can be read.  Lazy data stay lazy.
+    Names and bits come from the attributes `flag_meanings` and `flag_masks` (CF conventions, https://cfconventions.org,
+    3.5), so that files of any version can be read.  Lazy data stay lazy.
 
     Parameters
     ----------
     data : Dataset or DataArray
-        A result of `sweep`, `friction_parameters` or `simulate`, or a file of it opened with
-        xarray, of which `validity` is taken; or a bit mask itself.
+        A result of `sweep`, `friction_parameters` or `simulate`, or a file of it opened with xarray, of which
+        `validity` is taken; or a bit mask itself.
 
     Returns
     -------
     Dataset
-        `statically_unstable`, `uplift`, …: True where the flag is set; dimensions and
-        coordinates of the bit mask.  First the flags under which there is no value, then cautions, then
-        notes: the attribute `kind` says which, `long_name` what the flag means.
+        `statically_unstable`, `uplift`, …: True where the flag is set; dimensions and coordinates of the bit mask.
+        First the flags under which there is no value, then cautions, then notes: the attribute `kind` says which,
+        `long_name` what the flag means.
 
     Raises
     ------
@@ -37,10 +37,6 @@ def flags(data: xr.Dataset | xr.DataArray) -> xr.Dataset:
     See Also
     --------
     Validity : the flags by name
-
-    References
-    ----------
-    .. [1] B. Eaton et al., "NetCDF Climate and Forecast (CF) Metadata Conventions", https://cfconventions.org
 
     Examples
     --------

@@ -21,10 +21,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, least_squares
 
 from slipsweep.studies.datasets import sweep
-from slipsweep.studies.likelihood import SOUGHT, Linear, Observation
-from slipsweep.studies.table_motion import runs_of
-
-Floats = NDArray[np.float64]
+from slipsweep.studies.friction import Floats
+from slipsweep.studies.likelihood import SOUGHT, Linear, Observation, runs_of
 
 #: What decides the block's acceleration, of each test.
 Readings = tuple[str, ...]
@@ -63,7 +61,6 @@ class Scale:
         self.tan_theta = math.tan(math.radians(observations[0].theta))
 
     def parameters(self, point: Floats) -> Floats:
-        """Üy, λ and Δμ."""
         return np.array([point[0] * self.peak, point[1] * self.g / self.peak, self.mu_s * math.expm1(point[2])])
 
     def slopes(self, point: Floats) -> Floats:
@@ -71,15 +68,14 @@ class Scale:
         return np.array([self.peak, self.g / self.peak, self.mu_s * math.exp(point[2])])
 
     def readings(self, point: Floats) -> Readings:
-        """What decides the block's acceleration in each test."""
-        return tuple(self._reading(point, peak) for peak in self.peaks)
-
-    def _reading(self, point: Floats, peak: float) -> str:
-        """What decides the block's acceleration in a test of this peak.
+        """What decides the block's acceleration in each test.
 
         "continuous": Eq. 4 throughout.  "all": first Üy, later Eq. 4.  "crossing": Eq. 4, from where it crosses the
         table's acceleration on; Üy plays no part.  One value throughout: "held", Üy; "crossed", that at the crossing.
         """
+        return tuple(self._reading(point, peak) for peak in self.peaks)
+
+    def _reading(self, point: Floats, peak: float) -> str:
         onset, decay, excess = point
         table = np.linspace(0.0, 1.0, 65)[1:] * peak
         coupled = self.mu_s - self.tan_theta - self.mu_s * np.exp(excess - decay * table / self.peak)
@@ -123,7 +119,6 @@ class Search:
         self._least: dict[Readings, float] = {}
 
     def residuals(self, point: Floats) -> Floats:
-        """Residuals; the point is kept."""
         rest = self._residuals(point)
         self.tried.append(Tried(np.array(point), self._readings(point), float(rest @ rest)))
         branch = self.tried[-1].branch
@@ -131,18 +126,16 @@ class Search:
         return rest
 
     def square(self, point: Floats) -> float:
-        """Sum of squares; the point is kept."""
+        """Sum of squares."""
         self.residuals(point)
         return self.tried[-1].square
 
     @property
     def least(self) -> float:
-        """The least sum of squares."""
         return min(self._least.values())
 
     @property
     def best(self) -> Floats:
-        """The best of all points."""
         return min(self.tried, key=lambda one: one.square).point
 
     def above(self, one: Tried) -> float:
@@ -151,7 +144,6 @@ class Search:
         return one.square - least if least - self.least <= REFUTED else math.inf
 
     def allowed(self) -> list[Tried]:
-        """The points that the data allow."""
         return [one for one in self.tried if self.above(one) <= SQUARE]
 
     def leaders(self) -> list[Floats]:
@@ -164,18 +156,12 @@ class Search:
     def polish(self, start: Floats, free: Sequence[int] = (0, 1, 2), most: int = 12, loss: str = "linear") -> Floats:
         """Least squares over some parameters, from a start; the point found."""
         free = list(free)
-
-        def whole(part: Floats) -> Floats:
-            point = np.array(start)
-            point[free] = part
-            return point
-
         low, high = LEAST[free], MOST[free]
         found = least_squares(
-            lambda part: self.residuals(whole(part)), np.clip(start[free], low + 1e-9, high - 1e-9),
+            lambda part: self.residuals(_with(start, free, part)), np.clip(start[free], low + 1e-9, high - 1e-9),
             bounds=(low, high), diff_step=1e-6, max_nfev=most, loss=loss, f_scale=3.0, ftol=1e-6, xtol=1e-7,
         )  # fmt: skip
-        return whole(found.x)
+        return _with(start, free, found.x)
 
     def slopes(self, point: Floats) -> Floats:
         """Derivatives of the residuals by the parameters, a column each."""
@@ -198,10 +184,8 @@ class Search:
                 break
             self.polish(self.best)
         # what the profile of one parameter passed through may lie beyond the end of another's
-        passed = np.array([one.point for one in self.allowed()])
-        return np.column_stack(
-            [np.minimum(found[:, 0], passed.min(axis=0)), np.maximum(found[:, 1], passed.max(axis=0))]
-        )
+        every = np.vstack([found.T, [one.point for one in self.allowed()]])
+        return np.column_stack([every.min(axis=0), every.max(axis=0)])
 
     def end(self, at: int, side: int, width: float) -> float:
         """The lower (`side` −1) or upper (1) end of the interval of one parameter; the bound where the data set none.
@@ -285,8 +269,7 @@ class Estimate:
         low, high = self.intervals.T
         sizes = np.abs(self.parameters + np.array([0.0, 0.0, self.observations[0].mu_s]))
         known = np.isfinite(high) & (high - low <= 2.0 * np.array(_UNDETERMINED) * sizes)
-        known[0] &= low[0] > 0.0
-        return np.asarray(known)
+        return np.asarray(known & [low[0] > 0.0, True, True])
 
     @property
     def errors(self) -> Floats:
@@ -356,8 +339,8 @@ def _rough(observations: Sequence[Observation], scale: Scale) -> list[Floats]:
     def far(point: Floats) -> float:
         return float(np.sum(np.log1p(search.residuals(np.clip(point, LEAST, MOST)) ** 2)))
 
-    starts = sorted((np.clip(one, LEAST, MOST) for one in starts), key=far)[:_ROUGH]
-    return sorted((search.polish(start, loss="cauchy") for start in starts), key=far)[:_FINE]
+    nearest = sorted((np.clip(one, LEAST, MOST) for one in starts), key=far)[:_ROUGH]
+    return sorted((search.polish(start, loss="cauchy") for start in nearest), key=far)[:_FINE]
 
 
 def _try_branches(search: Search, scale: Scale) -> None:
@@ -388,22 +371,25 @@ def _beyond_mode_limit(ends: Floats, observations: Sequence[Observation], scale:
     return found
 
 
-def cycle_estimate(linear: Linear, found: Estimate, free: Sequence[int]) -> tuple[Floats, Floats]:
+def cycle_estimate(linear: Linear, found: Estimate, free: list[int]) -> tuple[Floats, Floats]:
     """Parameters and standard errors from the samples of one cycle; NaN of what these do not determine."""
-    free = list(free)
+    start = found.parameters[free]
 
     def residuals(part: Floats) -> Floats:
-        values = found.parameters.copy()
-        values[free] = part
-        return linear(values)
+        return linear(_with(found.parameters, free, part))
 
-    start = found.parameters[free]
     fit = least_squares(residuals, start, bounds=(-1e-9, 10.0 * start + 1.0), x_scale="jac", diff_step=1e-4, max_nfev=6)
-    values, errors = np.full(3, np.nan), np.full(3, np.nan)
-    covariance = _covariance(fit.jac)
-    if np.isfinite(covariance).all():
-        values[free], errors[free] = fit.x, np.sqrt(np.diag(covariance))
-    return values, errors
+    none, covariance = np.full(3, np.nan), _covariance(fit.jac)
+    if not np.isfinite(covariance).all():
+        return none, none
+    return _with(none, free, fit.x), _with(none, free, np.sqrt(np.diag(covariance)))
+
+
+def _with(point: Floats, free: list[int], part: Floats) -> Floats:
+    """A point with other values of some parameters."""
+    point = point.copy()
+    point[free] = part
+    return point
 
 
 def _covariance(slopes: Floats) -> Floats:

@@ -24,12 +24,14 @@ from slipsweep.errors import InputError
 from slipsweep.model.parameters import check_finite, check_numbers, check_single, shown, single_friction_coefficient
 from slipsweep.model.variables import HISTORY, MEASURED_FRICTION, PARAMETERS, REFERENCE, SLIDES
 from slipsweep.motion.shaking import CHANNELS, TABLE, ShakingTest, read_test, removed_text, unit_factor
-from slipsweep.studies.table_motion import noise_of
 
 Floats = NDArray[np.float64]
 
 #: What a caller may give as a test.
 Test = str | Path | ShakingTest | xr.Dataset | Mapping[str, xr.DataArray]
+
+#: Third differences of white noise have 20 times its variance; those of a motion that the sampling resolves are small.
+_VARIANCE = 20.0
 
 #: The threshold of a slide: standard deviations of the noise of r, of which one sample in 16 000 exceeds 4 by chance,
 #: and at least a part of the table's largest acceleration, by which two sensors may disagree.
@@ -51,6 +53,12 @@ SOURCE = {"source": f"slipsweep {__version__}", "references": REFERENCE}
 
 #: The ends of intervals of results.
 BOUND = xr.Variable(("bound",), [0.025, 0.975], {"units": "1", "long_name": "probability below an end of an interval"})
+
+
+def noise_of(values: Floats) -> float:
+    """Standard deviation of the noise of evenly or nearly evenly sampled values: robust, from third differences."""
+    differences = np.diff(values[np.isfinite(values)], 3) / _VARIANCE**0.5
+    return float(1.4826 * np.median(np.abs(differences))) if differences.size else 0.0
 
 
 def threshold_of(table: Floats, block: Floats) -> tuple[float, str]:
@@ -193,18 +201,15 @@ def measured_friction(
         A CSV file whose header names columns and units: ``time (s), table acceleration (g), block acceleration
         (m/s2)``; or a Dataset along `time` (s) with `ground_acceleration` (the table's) and `block_acceleration`,
         in m/s² or in the unit of their attribute `units`.  Samples need not be evenly spaced.
-    theta, mu_s : float
-        Inclination of the plane, degrees, and static friction coefficient.
-    phi : float, optional
-        Friction angle, degrees, instead of mu_s = tan phi.
+    theta, mu_s, phi : float
+        Inclination of the plane, degrees, and static friction coefficient, or its angle, degrees: mu_s = tan phi.
     g : float
         Gravity, m/s².
     offset, drift : str or list of str
-        Channels to take a constant, or a straight line, off; "all" for all.  What was taken off stands in the
-        attribute `removed`.  Nothing else is subtracted.
+        Channels to take a constant, or a straight line, off; "all" for all.  What was taken off, and nothing else is,
+        stands in the attribute `removed`.
     rest : (float, float), optional
-        From when to when table and block were at rest, s: what is taken off is then fitted to these samples, else
-        to all.
+        From when to when table and block were at rest, s: what is taken off is fitted to these samples, else to all.
     threshold : float, optional
         Relative acceleration beyond which the block slides, m/s²; by default 4 standard deviations of its noise, and
         0.5 % of the table's largest acceleration at least.

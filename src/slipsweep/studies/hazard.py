@@ -16,17 +16,14 @@ from xml.etree import ElementTree as xml
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from slipsweep.errors import InputError, RunError
 from slipsweep.model.parameters import check_numbers, number_text, shown
 from slipsweep.model.units import conversion
 from slipsweep.model.variables import HAZARD_RESULTS
 from slipsweep.motion.formats import read_columns, read_lines
-from slipsweep.studies.sampling import Thresholds
+from slipsweep.studies.sampling import Floats, Thresholds
 from slipsweep.studies.suite_statistics import THRESHOLDS, at_thresholds, point_names, suite_dims, suite_statistics
-
-Floats = NDArray[np.float64]
 
 TITLE = "Mean annual rate of exceeding a permanent displacement"
 
@@ -180,18 +177,17 @@ def fragility(result: xr.Dataset, thresholds: Thresholds | None = None, over: An
             "result: amplitude: must be a dimension of two peak ground accelerations or more: the probability of "
             "exceedance is needed at each"
         )
+    wanted = ["exceedance_probability", "valueless_share"]
     if name == "permanent_displacement":
-        wanted = THRESHOLDS if thresholds is None else thresholds
-        found = suite_statistics(result, thresholds=wanted, quantiles=0.5, over=over)
-        found = found[["exceedance_probability", "valueless_share"]]
+        given = THRESHOLDS if thresholds is None else thresholds
+        found = suite_statistics(result, thresholds=given, quantiles=0.5, over=over)[wanted]
     else:
-        found = result[["exceedance_probability", "valueless_share"]].load()
+        found = result[wanted].load()
         if thresholds is not None:
             found = at_thresholds(found, thresholds)
         dims = suite_dims(found["exceedance_probability"], over) if "motion" in found.dims else ()
         pooled = re.findall(r"\d+ (\w+)", str(result.attrs.get("pooled", "")))  # of "4 motion x 2 polarity"
-        suite = " ".join((*dims, *pooled, "samples"))
-        found = found.mean(dims, keep_attrs=True).assign_attrs(suite_dimensions=suite)
+        found = found.mean(dims, keep_attrs=True).assign_attrs(suite_dimensions=" ".join((*dims, *pooled, "samples")))
     # none exceeds anything at 0, which has no logarithm
     found = found.isel(amplitude=np.flatnonzero(found["amplitude"].values > 0.0)).sortby("amplitude")
     return found.transpose(..., "amplitude", "threshold")
@@ -255,8 +251,7 @@ def exceedance_rates(curve: HazardCurve, amplitude: Any, probability: Any) -> di
     inside = np.tensordot(drops, chances[:-1], 1) + np.tensordot(weights, np.diff(chances, axis=0), 1)
     held = chances[-1] * rates[-1]
     below = np.clip(np.searchsorted(given, points[:-1], side="right") - 1, 0, given.size - 2)
-    ends = np.stack([shares[below], shares[below + 1]])
-    lower, upper = (np.tensordot(drops, extreme(axis=0), 1) + held for extreme in (ends.min, ends.max))
+    ends = np.sort([shares[below], shares[below + 1]], axis=0)
     omitted = chances[0] * (curve.rate[0] - rates[0])
     if curve.amplitude[0] > given[0]:  # how often what lies below the curve occurs is not known
         omitted = np.where(chances[0] > 0.0, np.nan, omitted)
@@ -264,8 +259,8 @@ def exceedance_rates(curve: HazardCurve, amplitude: Any, probability: Any) -> di
         "annual_rate": inside + held,
         "held_rate": held,
         "omitted_rate": omitted,
-        "lower_rate": lower,
-        "upper_rate": upper,
+        "lower_rate": np.tensordot(drops, ends[0], 1) + held,
+        "upper_rate": np.tensordot(drops, ends[1], 1) + held,
     }
 
 
@@ -276,11 +271,10 @@ def displacement_hazard(
     *,
     over: str | Sequence[str] | None = None,
 ) -> xr.Dataset:
-    """Mean annual rates of exceeding displacements, from a hazard curve and a fragility along `amplitude`.
+    """Mean annual rates of exceeding displacements (Cornell [1]_), from a hazard curve and a fragility.
 
     P(u > d | A) is the share of the motions, or of the samples of uncertain inputs, that exceed d; it is straight in
     ln A between the amplitudes of the result.  The hazard curve is straight in logarithms of both between its points.
-    The rate is that of Cornell [1]_.
 
     Parameters
     ----------
@@ -288,8 +282,7 @@ def displacement_hazard(
         A result of `sweep` with the dimensions `motion` and `amplitude`, or of `sample` with `amplitude`: motions of a
         suite that were not pooled are equally likely.
     curve : HazardCurve, str or Path
-        Or a CSV file with the columns "PGA (g)" and "annual rate", or of OpenQuake (hazard_curve-mean-PGA) with one
-        site.
+        Or a CSV file with the columns "PGA (g)" and "annual rate", or one of OpenQuake's with one site.
     thresholds : float, str or list of these, optional
         Increasing displacements, m or with a unit ("50mm"), ≥ 0; by default 0.01, 0.1 and 1 m.  Of a result of
         `sample` they must be among those that it has, which are the default.
@@ -307,8 +300,7 @@ def displacement_hazard(
           NaN where the curve starts above the smallest amplitude, and P is not 0 there.
         - `lower_rate`, `upper_rate`: the rate if P between two amplitudes is the lower, or the higher, of the two.  Far
           from each other, more amplitudes are needed.
-
-        `valueless_share` is the largest share of motions or samples without a value at any amplitude.
+        - `valueless_share`: the largest share of motions or samples without a value at any amplitude.
 
     Raises
     ------
@@ -346,38 +338,32 @@ def displacement_hazard(
     amplitude = found["amplitude"].values.astype(np.float64)
     names = [name for name in HAZARD_RESULTS if name != "valueless_share"]
 
-    def rates_of(chances: Floats) -> Floats:
-        """The rates of a grid point, (rate, threshold), from its probabilities, (amplitude, threshold)."""
+    def rates_of(chances: Floats) -> tuple[Floats, ...]:
+        """The rates of a grid point, (threshold,) each, from its probabilities, (amplitude, threshold)."""
         there = np.isfinite(chances[:, 0])
         own = chances[there]
         if len(own) < 2:
-            return np.full((len(names), chances.shape[1]), np.nan)
+            return (np.full(chances.shape[1], np.nan),) * len(names)
         if len(own) == 2 and (own[0] != own[1]).any():
             raise InputError(
                 "result: amplitude: only two peak ground accelerations have a value, and P(u > d) differs between "
                 "them; how it grows in between is not known: run the sweep with more values on the axis amplitude"
             )
         rates = exceedance_rates(curve, amplitude[there], own)
-        return np.stack([rates[name] for name in names])
+        return tuple(rates[name] for name in names)
 
-    rates = xr.apply_ufunc(
+    every = xr.apply_ufunc(
         rates_of, found["exceedance_probability"].variable, vectorize=True,
-        input_core_dims=[["amplitude", "threshold"]], output_core_dims=[["rate", "threshold"]],
+        input_core_dims=[["amplitude", "threshold"]], output_core_dims=[["threshold"]] * len(names),
     )  # fmt: skip
-    if rates[{"rate": 0}].isnull().all():
+    results = dict(zip(names, every, strict=True))
+    if results["annual_rate"].isnull().all():
         raise RunError("no annual rate: the model gives no value under any motion at two amplitudes or more")
-    results = {name: rates[{"rate": at}] for at, name in enumerate(names)}
     results["valueless_share"] = found["valueless_share"].max("amplitude").variable
     for name, one in results.items():
         one.attrs = HAZARD_RESULTS[name]
     coords = {name: one.variable for name, one in found.coords.items() if "amplitude" not in (*one.dims, name)}
     found.attrs.pop("zero_displacement", None)
-    attrs = {
-        **found.attrs,
-        "title": TITLE,
-        "hazard_curve": curve.name,
-        **curve.attrs,
-        "hazard_curve_range": curve.amplitude[[0, -1]],
-        "amplitude_range": amplitude[[0, -1]],
-    }
-    return xr.Dataset(results, coords, attrs)
+    attrs = {**found.attrs, "title": TITLE, "hazard_curve": curve.name, **curve.attrs}
+    ranges = {"hazard_curve_range": curve.amplitude[[0, -1]], "amplitude_range": amplitude[[0, -1]]}
+    return xr.Dataset(results, coords, attrs | ranges)

@@ -69,21 +69,20 @@ def simulate(
         One case; these and the remaining parameters as in `slipsweep.sweep`, but that of a suite one motion is taken:
         ``excitation=suite["label"]``, of a pair ``suite["label"].rotated(azimuth)``.
     times : array, optional
-        Times to sample, s, increasing, and not negative under a waveform; by default `points_per_cycle` a
-        cycle, from 0 to the end of the shaking, or the times of a record's samples; and on until the block has
-        come to rest, if that is later.  A slide that lasts long after the shaking has as many points as 100 cycles
-        have (after a record 20 000, or as many as it has samples), evenly spaced.
+        Times to sample, s, increasing, and not negative under a waveform; by default `points_per_cycle` a cycle, from 0
+        to the end of the shaking, or the times of a record's samples; and on until the block has come to rest, if that
+        is later.  A slide that lasts long after the shaking has as many points as 100 cycles have (after a record
+        20 000, or as many as it has samples), evenly spaced.
     points_per_cycle : int, optional
         Samples a cycle where `times` is not given, 512 by default; not with a record.
 
     Returns
     -------
     Dataset
-        Along `time` (s): `ground_acceleration`, `block_acceleration` (m/s²),
-        `friction_coefficient` (what Eq. 1 gives for the two; not with `yield_coefficient`), `relative_velocity` (m/s)
-        and `relative_displacement` (m); and the results of `sweep` for the case.  Where the base's acceleration
-        jumps, as at the end of a record, the values are those after the jump.  NaN where
-        the case has no value (`validity`).
+        Along `time` (s): `ground_acceleration`, `block_acceleration` (m/s²), `friction_coefficient` (what Eq. 1 gives
+        for the two; not with `yield_coefficient`), `relative_velocity` (m/s) and `relative_displacement` (m); and the
+        results of `sweep` for the case.  Where the base's acceleration jumps, as at the end of a record, the values are
+        those after the jump.  NaN where the case has no value (`validity`).
 
     Raises
     ------
@@ -174,16 +173,16 @@ class _History:
 
     def columns(self, phases: Floats) -> dict[str, xr.Variable]:
         """The variables of a history."""
-        table = self.sampled(phases)
-        # Eq. 1 needs θ and μs
-        known = {name: at for at, name in enumerate(HISTORY) if name != "friction_coefficient" or "mu_s" in self.inputs}
+        found = dict(zip(HISTORY, self.sampled(phases), strict=True))
+        if "mu_s" not in self.inputs:  # Eq. 1 needs θ and μs
+            del found["friction_coefficient"]
         with np.errstate(over="ignore"):
-            table[3] *= self.unit
-            table[4] *= self.unit * self.unit
-        if not self.valueless and not np.isfinite(table[[*known.values()]]).all():
+            found["relative_velocity"] *= self.unit
+            found["relative_displacement"] *= self.unit * self.unit
+        if not self.valueless and not all(np.isfinite(values).all() for values in found.values()):
             given = ", ".join(f"{name} = {parameters.number_text(float(one))}" for name, one in self.inputs.items())
             raise InputError(f"{given}: the history is then no finite number in double precision; must be nearer to 1")
-        return {name: xr.Variable(("time",), table[at].copy(), HISTORY[name]) for name, at in known.items()}
+        return {name: xr.Variable(("time",), values.copy(), HISTORY[name]) for name, values in found.items()}
 
     def half_waves(self) -> dict[str, xr.Variable]:
         """The positive half waves of a record, and the sliding mode of each (`HALF_WAVES`); of a waveform none."""
@@ -208,7 +207,7 @@ class _History:
 
     def points(self, points_per_cycle: int) -> Floats:
         """Phases of so many points a cycle, or the samples of a record, and on to the end of the slide."""
-        motion = self.problem.excitation
+        motion, is_wave = self.problem.excitation, isinstance(self.problem.excitation, Waveform)
         if isinstance(motion, Record):
             count, most = motion.times.size, max(_POINTS_BEYOND, motion.times.size)
             step = float(np.ptp(motion.times)) / (count - 1)
@@ -221,7 +220,7 @@ class _History:
         advice = "take fewer cycles or points_per_cycle, or give times"
         resources.check_memory(f"a history of {count + most:.4g} points", needed, advice)
         shaken = motion.times if isinstance(motion, Record) else step * np.arange(count, dtype=np.float64)
-        after, is_wave = 0.0, isinstance(motion, Waveform)
+        after = 0.0
         if not self.valueless and not (is_wave and self.summary["sliding_mode"] != variables.SlidingMode.STICK_SLIP):
             ground, block, _, velocity, _ = self.sampled(shaken[-1:])[:, 0]
             # after the shaking the block is still braked, by b = Ü - Üg (Eq. 12)

@@ -8,6 +8,11 @@ and are made independent by it.
 Three kinds of samples count less.  The block's acceleration jumps where the block stops, and a sample beside a jump
 tells only on which side of it the jump lies: it is left out.  Readings of a converter that repeat are one
 reading: n of them have the weight of one.  Slips upslope, which stick-slip does not have, are left out.
+
+The motion of the table behind its noisy record is a least-squares spline.  The block integrates the table's
+acceleration and its own rises with the largest that the table reached: noise taken for motion would shift both.
+Akaike's criterion (corrected for few samples) chooses the number of coefficients: few under a smooth motion, many under
+a sharp one or without noise.  A kink is put where the shaking begins and ends if the criterion asks for it.
 """
 
 import functools
@@ -18,6 +23,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from scipy.interpolate import BSpline, make_lsq_spline
+from scipy.linalg import cholesky, solve_triangular
 
 from slipsweep.errors import InputError
 from slipsweep.grid.inputs import Problem
@@ -30,10 +37,8 @@ from slipsweep.model.variables import HISTORY
 from slipsweep.motion.cutting import wave_of_record
 from slipsweep.motion.records import Record
 from slipsweep.motion.shaking import RESPONSES, TABLE, ShakingTest, check_channels
-from slipsweep.studies import table_motion
-from slipsweep.studies.friction import check_contact
+from slipsweep.studies.friction import Floats, check_contact, noise_of
 
-Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 #: The series of `HISTORY` at some times, for Üy, λ and Δμ.
@@ -48,7 +53,7 @@ _LEAST_NOISE = 1e-5
 #: Intervals of sampling to either side of a jump that are left out.
 _BESIDE_A_JUMP = 1.6
 
-#: Standard deviation of an offset or drift, in parts of a channel's largest value: no bound, in effect.
+#: Standard deviation of an offset, drift or step, in parts of a channel's largest value: no bound, in effect.
 _LARGE = 3.0
 
 #: Noise of the channels, in parts of their largest values, of a rough likelihood.
@@ -59,6 +64,28 @@ _SHAPE_STEP, _LINE_STEP = 0.3, 1e-3
 
 #: Consecutive samples, and standard deviations of the noise, by which a block slips upslope.
 _UPSLOPE_SAMPLES, _UPSLOPE_NOISE = 4, 5.0
+
+#: Degree of the table's spline.
+_DEGREE = 3
+
+#: Samples for each coefficient that are tried.
+_SPACINGS = (64, 48, 32, 24, 16, 12, 10, 8, 6, 5, 4, 3, 2)
+
+#: Spacings by which the knots are closer than the criterion says: what a spline cannot follow is no noise, and enters
+#: no interval.
+_FINER = 2
+
+#: Most coefficients whose uncertainty is followed; each costs a solution.
+_MOST_SHAPES = 150
+
+#: Multiples of the noise beyond which the table moves, and samples before that where a kink is tried.
+_MOVES, _KINK_SAMPLES = 5.0, 12
+
+#: Linear interpolation of the spline is wrong by this part of the noise at most, between these numbers of points.
+_INTERPOLATION, _FEWEST_POINTS, _MOST_POINTS = 0.1, 4, 32
+
+#: Multiple of the standard deviation of a converter's errors that is taken for their noise.
+_CONVERTER = 1.6
 
 
 class Line(NamedTuple):
@@ -89,8 +116,7 @@ class Linear:
         return np.asarray(rest - self._shrunk @ (self.left.T @ rest))
 
     def _raw(self, parameters: Floats) -> Floats:
-        computed = self.computed(parameters)
-        return np.where(np.isfinite(computed), self.measured - computed, 1e3)
+        return np.nan_to_num(self.measured - self.computed(parameters), nan=1e3, posinf=1e3, neginf=1e3)
 
     def nuisances(self, parameters: Floats) -> tuple[Floats, Floats]:
         """Most likely values of the nuisance parameters and their standard deviations, in those of their priors."""
@@ -137,10 +163,10 @@ class Observation:
         self._beside_jumps = np.zeros_like(self._use)
         self._weights = np.array([_weights_of(values) for values in measured])
         self.largest = np.nanmax(np.abs(measured), axis=1)
-        converters = [max(table_motion.converter_noise(values), 1e-15) for values in measured]
+        converters = [max(converter_noise(values), 1e-15) for values in measured]
         self._least_noise = np.maximum(_LEAST_NOISE * self.largest, converters)
         self._given_noise = np.array([noise.get(name, np.nan) for name in self.channels])
-        scatter = np.maximum([table_motion.noise_of(values) for values in measured], self._least_noise)
+        scatter = np.maximum([noise_of(values) for values in measured], self._least_noise)
         self.sensor_noise = np.where(np.isnan(self._given_noise), scatter, self._given_noise)
         self._noise = self.sensor_noise.copy()
         self.lines: list[Line] = []
@@ -151,7 +177,7 @@ class Observation:
                 self.lines.append(Line("offset", name, size, np.full(since.size, size)))
             if name in drifts:
                 self.lines.append(Line("drift", name, size, size * since))
-        self.motion = table_motion.table_motion(test.times, test.channels[TABLE])
+        self.motion = table_motion(test.times, test.channels[TABLE])
         of_table = [np.interp(self.motion.times, test.times, one.values) for one in self.lines if one.channel == TABLE]
         self._shapes = np.column_stack([self.motion.shapes, *(-line for line in of_table)])
         self.wrong = np.zeros(self._shapes.shape[1])
@@ -214,13 +240,13 @@ class Observation:
         measured = self._weighted(self.test.channels) + effects[:, :moving] @ self.wrong
         self.linear = Linear(functools.partial(computed, self.forward), measured, effects)
 
-    def unexplained(self, parameters: Floats) -> list[Floats]:
+    def _unexplained(self, parameters: Floats) -> list[Floats]:
         """What nothing explains of the samples of each channel, in its own unit."""
         return self._by_channel(self.linear.unexplained(parameters) / self._scale)
 
     def misfits(self, parameters: Floats) -> list[float]:
         """Root mean square of what nothing explains of each channel."""
-        return [float(np.sqrt(np.mean(rest**2))) for rest in self.unexplained(parameters)]
+        return [float(np.sqrt(np.mean(rest**2))) for rest in self._unexplained(parameters)]
 
     def cycle(self, begin: float, end: float, speed: float) -> Linear:
         """The samples between two times; the motion at the beginning is unknown, velocities of the order of `speed`."""
@@ -235,7 +261,7 @@ class Observation:
     def settle(self, parameters: Floats) -> None:
         """Estimate the noise that is not given, take the table's motion as most likely, leave out samples at jumps."""
         leverage = self._by_channel(self.linear.left**2 @ self.linear.known)
-        weights, rests = self._by_channel(self._scale), self.unexplained(parameters)
+        weights, rests = self._by_channel(self._scale), self._unexplained(parameters)
         for at, (rest, part) in enumerate(zip(rests, leverage, strict=True)):
             weight = weights[at] * self._noise[at]
             freedom = float(np.sum(weight**2)) - float(np.sum(part)) - 1.0
@@ -271,15 +297,15 @@ class Observation:
             velocity = np.gradient(channels["relative_displacement"], times)
         else:
             return
-        noise = max(table_motion.noise_of(velocity), 2e-3 * float(np.nanmax(np.abs(velocity))))
+        noise = max(noise_of(velocity), 2e-3 * float(np.nanmax(np.abs(velocity))))
         upslope = np.nan_to_num(velocity) < -_UPSLOPE_NOISE * noise
         several = ndimage.binary_opening(upslope, np.ones(_UPSLOPE_SAMPLES))
         slips = ndimage.binary_dilation(several, iterations=3)
         self._use = self._use & ~slips
-        self.upslope = [float(times[slip.start]) for slip in table_motion.runs_of(slips)]
-        if "relative_displacement" in channels:
-            size = 3.0 * float(np.nanmax(np.abs(channels["relative_displacement"])))
-            for slip in table_motion.runs_of(slips):
+        for slip in runs_of(slips):
+            self.upslope.append(float(times[slip.start]))
+            if "relative_displacement" in channels:
+                size = _LARGE * float(np.nanmax(np.abs(channels["relative_displacement"])))
                 name, step = f"upslope slip at {times[slip.start]:.4g} s", size * (times > times[slip.stop - 1])
                 self.lines.append(Line(name, "relative_displacement", size, step))
 
@@ -295,3 +321,121 @@ def _weights_of(values: Floats) -> Floats:
     _, level, counts = np.unique(values[runs], return_inverse=True, return_counts=True)
     weights[runs] = 1.0 / np.sqrt(counts[level])
     return weights
+
+
+class TableMotion(NamedTuple):
+    """A table's motion (s and m/s², linear between its points) with its uncertainty.
+
+    `shapes` are independent errors that it may have, one a column, each of one standard deviation; `noise` is the
+    standard deviation of the noise of the record, m/s².
+    """
+
+    times: Floats
+    acceleration: Floats
+    shapes: Floats
+    noise: float
+
+
+class _Fitted(NamedTuple):
+    """A spline, Akaike's criterion for it, and the noise that it leaves."""
+
+    spline: BSpline
+    score: float
+    noise: float
+
+
+def converter_noise(values: Floats) -> float:
+    """The least noise of digitised values: errors of a converter repeat from cycle to cycle and average out less."""
+    steps = np.diff(np.unique(values[np.isfinite(values)]))
+    return _CONVERTER * float(steps.min(initial=np.inf)) / 12.0**0.5 if steps.size else 0.0
+
+
+def runs_of(holds: NDArray[np.bool_]) -> list[slice]:
+    """The runs of samples at which something holds."""
+    return [part for (part,) in ndimage.find_objects(ndimage.label(holds)[0])]
+
+
+def table_motion(times: Floats, acceleration: Floats) -> TableMotion:
+    """The motion behind a record of a table's acceleration."""
+    fits = [one for spacing in _SPACINGS if (one := _fitted(times, acceleration, _knots(times, spacing))) is not None]
+    chosen = min(range(len(fits)), key=lambda at: fits[at].score)
+    best, kinked = _with_kinks(times, acceleration, fits[min(chosen + _FINER, len(fits) - 1)])
+    knots = best.spline.t
+    bounds = np.unique(knots)
+    curvature = np.abs(best.spline(times, nu=2)).max() * np.diff(bounds).max() ** 2 / 8.0
+    parts = np.sqrt(curvature / max(_INTERPOLATION * best.noise, 1e-9 * float(np.abs(acceleration).max())))
+    parts = int(np.clip(np.ceil(parts), _FEWEST_POINTS, _MOST_POINTS))
+    fine = np.interp(np.arange((bounds.size - 1) * parts + 1) / parts, np.arange(bounds.size), bounds)
+    # of many coefficients only what is wrong over long times matters, which fewer can say
+    coarse = knots if knots.size <= _MOST_SHAPES else _knots(times, -(-times.size // _MOST_SHAPES))
+    design = BSpline.design_matrix(times, coarse, _DEGREE)
+    root = cholesky((design.T @ design).toarray() + 1e-9 * np.eye(design.shape[1]), lower=True)
+    shapes = solve_triangular(root, BSpline.design_matrix(fine, coarse, _DEGREE).toarray().T, lower=True).T
+    noise = max(best.noise, converter_noise(acceleration))
+    smooth, errors = np.asarray(best.spline(fine)), [noise * shapes]
+    for fits in kinked:
+        # of a converter's noise only a part is seen as scatter
+        off, error = _averaged(fits, fine, (best.noise / noise) ** 2)
+        smooth = smooth + off
+        errors.append(error)
+    # chords of a curve lie on its hollow side: moved back by their mean distance, the integral is right; beside a kink
+    # the curve bends only over the shorter of two intervals, which may be much the shorter
+    width = np.minimum(np.diff(fine, prepend=-np.inf), np.diff(fine, append=np.inf))
+    smooth = smooth - width**2 / 12.0 * best.spline(fine, nu=2)
+    return TableMotion(fine, smooth, np.column_stack(errors), noise)
+
+
+def _fitted(times: Floats, values: Floats, knots: Floats) -> _Fitted | None:
+    """The spline on these knots; None where samples are too few for them."""
+    size, number = times.size, knots.size - _DEGREE - 1
+    if number + 2 >= size:
+        return None
+    try:
+        spline = make_lsq_spline(times, values, knots, _DEGREE)
+    except (ValueError, np.linalg.LinAlgError):  # an interval of knots without a sample
+        return None
+    square = max(float(np.sum((values - spline(times)) ** 2)), 1e-24 * float(np.sum(values**2)))
+    score = size * float(np.log(square / size)) + 2.0 * number * size / (size - number - 1.0)
+    return _Fitted(spline, score, float(np.sqrt(square / (size - number))))
+
+
+def _knots(times: Floats, spacing: int) -> Floats:
+    """Knots that have about so many samples between each other, however these are spaced."""
+    count = max(times.size // spacing, 1)
+    inner = np.interp(np.linspace(0, times.size - 1, count + 1), np.arange(times.size), times)
+    return np.concatenate([np.repeat(times[0], _DEGREE), inner, np.repeat(times[-1], _DEGREE)])
+
+
+def _with_kinks(times: Floats, values: Floats, best: _Fitted) -> tuple[_Fitted, list[list[_Fitted]]]:
+    """The spline with a kink where the shaking begins, and one where it ends, if these improve it, as for a sine.
+
+    Beside it, for each kink, the splines with the kink at this and other places that are likely.
+    """
+    moving = np.flatnonzero(np.abs(values) > _MOVES * max(noise_of(values), 1e-6 * float(np.abs(values).max())))
+    kinked: list[list[_Fitted]] = []
+    for end, side in ((0, -1.0), (-1, 1.0)) if moving.size else ():
+        places = moving[end] + side * 0.25 * np.arange(4 * _KINK_SAMPLES)
+        places = places[(places > 2) & (places < times.size - 3)]
+        knots, tried = best.spline.t, []
+        for at in np.interp(places, np.arange(times.size), times):
+            outside = (knots < at) & (knots > times[0]) if end == 0 else (knots > at) & (knots < times[-1])
+            for kept in (knots, knots[~outside]):  # at rest outside, one polynomial is enough
+                near = np.abs(kept - at) < 1e-9 * (times[-1] - times[0])
+                tried.append(_fitted(times, values, np.sort(np.concatenate([kept[~near], np.repeat(at, _DEGREE)]))))
+        found = [one for one in tried if one is not None]
+        top = min(found, key=lambda one: one.score, default=best)
+        if top.score < best.score:
+            best = top
+            kinked.append([one for one in found if one.score < top.score + 12.0])
+    return best, kinked
+
+
+def _averaged(fits: list[_Fitted], fine: Floats, part: float) -> tuple[Floats, Floats]:
+    """By what splines with a kink at several places, averaged by likelihood, differ from the best; errors of this."""
+    best = min(fits, key=lambda one: one.score)
+    likely = np.exp([0.5 * part * (best.score - one.score) for one in fits])
+    likely /= likely.sum()
+    apart = np.column_stack([one.spline(fine) - best.spline(fine) for one in fits])
+    middle = apart @ likely
+    left, sizes, _ = np.linalg.svd((apart - middle[:, None]) * np.sqrt(likely), full_matrices=False)
+    return middle, (left * sizes)[:, :3]

@@ -34,9 +34,6 @@ from slipsweep.studies.datasets import Values
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-#: Whether something has changed at amplitudes, for intervals by their indices.
-Changed = Callable[[Floats, Indices], NDArray[np.bool_]]
-
 TITLE = "Amplitudes at which a tolerable displacement is reached"
 
 #: Steps of the scan, in equal ratios from the yield acceleration to the maximum amplitude.
@@ -93,18 +90,16 @@ def limit_amplitude(
 ) -> xr.Dataset:
     """Smallest amplitude at which the permanent displacement reaches a tolerable one.
 
-    The inverse of `sweep`, exact to the last bit: `sweep` with the cycle solver gives at
-    least `displacement` at the amplitude returned, and less (or no value) at the
-    double-precision number before it.
+    The inverse of `sweep`, exact to the last bit: `sweep` with the cycle solver gives at least `displacement` at the
+    amplitude returned, and less (or no value) at the double-precision number before it.
 
-    The displacement u(A) need not grow with A, jumps where the sliding mode changes, and has
-    gaps where the model gives no value (`validity`), so that a displacement may be reached at
-    several amplitudes, or passed in a jump.  The smallest is returned: the first step of a scan
-    with ``u >= displacement`` holds it.  The scan runs from the yield acceleration to
-    `maximum_amplitude` in `amplitude_steps` equal ratios, finer where it may hide a peak, and has
-    both sides of the change of mode.  A peak narrower than a part of a step can be missed.  Under a
-    record the amplitude is that peak ground acceleration to which it is scaled, and the scan has both
-    sides of every amplitude at which one of its 128 highest pulses begins to count, or changes its mode.
+    The displacement u(A) need not grow with A, jumps where the sliding mode changes, and has gaps where the model gives
+    no value (`validity`), so that a displacement may be reached at several amplitudes, or passed in a jump.  The
+    smallest is returned: the first step of a scan with ``u >= displacement`` holds it.  The scan runs from the yield
+    acceleration to `maximum_amplitude` in `amplitude_steps` equal ratios, finer where it may hide a peak, and has both
+    sides of the change of mode.  A peak narrower than a part of a step can be missed.  Under a record the amplitude is
+    that peak ground acceleration to which it is scaled, and the scan has both sides of every amplitude at which one of
+    its 128 highest pulses begins to count, or changes its mode.
 
     Parameters
     ----------
@@ -126,9 +121,9 @@ def limit_amplitude(
         Dimensions theta, mu_s, frequency, then others, displacement last:
 
         - `limit_amplitude`, m/s²; NaN where there is none.
-        - `limit_status`: 0 reached, 1 at_mode_jump, 2 at_jump (u rises by more than 1e-6 of
-          itself between neighbouring numbers, with and without a change of sliding mode),
-          3 after_gap (no value just below), 4 not_reached, 5 invalid (no value anywhere).
+        - `limit_status`: 0 reached, 1 at_mode_jump, 2 at_jump (u rises by more than 1e-6 of itself between neighbouring
+          numbers, with and without a change of sliding mode), 3 after_gap (no value just below), 4 not_reached,
+          5 invalid (no value anywhere).
         - `permanent_displacement`, m, and `sliding_mode` (under a record the counts of slips and pulses) at the
           limit; more than `displacement` where a discontinuity of the model sets the limit.
         - `validity` at the limit or, where there is none, at `maximum_amplitude`.
@@ -186,7 +181,6 @@ def plan_limits(
         )
     target = xr.Variable(dims, values, variables.TOLERABLE_DISPLACEMENT)
     steps = parameters.check_whole("amplitude_steps", amplitude_steps, 2, 1_000_000)
-
     # displacement and amplitude change places: in the layout of the grid it stands where the amplitude would
     swapped = inputs.but({"amplitude": xr.Variable(dims, values)})
     plan = plan_sweep(swapped, excitation=excitation, model=model, variables=["permanent_displacement"])
@@ -246,9 +240,8 @@ def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> Array
     results["validity"][:] = scan.found["validity"][:, -1]
     valueless = np.isnan(scan.found["permanent_displacement"]).all(axis=1)
     results["limit_status"][:] = np.where(valueless, LimitStatus.INVALID, LimitStatus.NOT_REACHED)
-    for name, values in after.items():
+    for name, values in {**after, "limit_amplitude": high}.items():
         results[name][cell] = values
-    results["limit_amplitude"][cell] = high
     below, above = before["permanent_displacement"], after["permanent_displacement"]
     jumps = above - below > JUMP * above
     modes = [name for name in ("sliding_mode", "stick_slip_pulses", "continuous_pulses") if name in after]
@@ -310,7 +303,7 @@ class Scan:
 
 
 def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) -> Floats:
-    """Amplitudes to try, increasing along the last dimension, with both sides of every change of mode.
+    """Amplitudes to try along the last dimension, with both sides of every change of mode.
 
     The other dimensions are those of the grid, of length 1 where only the target or the time scale varies.
     """
@@ -417,10 +410,12 @@ def _at_change(
     return Steps(cell[found], np.where(at_low, start, low)[found], np.where(at_low, low, high)[found])
 
 
-def _bisected(low: Floats, high: Floats, changed: Changed, width: Floats | float = 0.0) -> tuple[Floats, Floats]:
+def _bisected(
+    low: Floats, high: Floats, changed: Callable[[Floats, Indices], NDArray[np.bool_]], width: Floats | float = 0.0
+) -> tuple[Floats, Floats]:
     """Halve intervals until their ends are neighbours in double precision, or no further apart than `width`.
 
-    `changed` holds at `high` and not at `low`.
+    `changed`, of amplitudes and the indices of their intervals, holds at `high` and not at `low`.
     """
     low, high = low.copy(), high.copy()
     active, width = np.arange(low.size), np.broadcast_to(width, low.shape)

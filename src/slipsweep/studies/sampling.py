@@ -113,10 +113,8 @@ class Sampling:
 
         self.keys = keys
         if not isinstance(uncertain, Mapping) or not uncertain:
-            raise InputError(
-                f"{self.key('').removesuffix('.')}: must give the distribution of one parameter at least: "
-                f"{', '.join(DRAWN)}"
-            )
+            key, known = self.key("").removesuffix("."), ", ".join(DRAWN)
+            raise InputError(f"{key}: must give the distribution of one parameter at least: {known}")
         for name in uncertain:
             if name not in DRAWN:
                 raise InputError(f"{self.key(name)}: cannot be drawn; {did_you_mean(str(name), DRAWN)}")
@@ -155,10 +153,8 @@ class Sampling:
         #: Runs of a grid point: the samples, or all that its Sobol indices take.
         self.runs = self.samples * (number + 2 if sensitivity else 1)
         if self.runs > MOST_SAMPLES:
-            raise InputError(
-                f"{keys}samples = {self.samples}: Sobol indices take {self.runs} runs a grid point with these; "
-                f"must be {MOST_SAMPLES} at most"
-            )
+            taken = f"Sobol indices take {self.runs} runs a grid point with these"
+            raise InputError(f"{keys}samples = {self.samples}: {taken}; must be {MOST_SAMPLES} at most")
 
     def key(self, parameter: Any) -> str:
         """What a distribution is called in errors."""
@@ -301,9 +297,8 @@ def _pairs(key: str, given: Any, known: Sequence[str]) -> tuple[tuple[str, str, 
         first, second = (check_choice(key, name, known) for name in one[:2])
         value, pair = check_finite(key, one[2]), frozenset((first, second))
         if len(pair) < 2 or pair in pairs or not -1.0 < value < 1.0:
-            raise InputError(
-                f"{key} = {shown(entry)}: must be two parameters, each pair once, and a number between -1 and 1"
-            )
+            what = "two parameters, each pair once, and a number between -1 and 1"
+            raise InputError(f"{key} = {shown(entry)}: must be {what}")
         pairs[pair] = first, second, value
     return tuple(pairs.values())
 
@@ -315,14 +310,11 @@ def sobol_indices(sampling: Sampling, displacement: Floats) -> dict[str, NDArray
     """
     runs = displacement.reshape(-1, len(sampling.independent) + 2, sampling.samples)
     status, values = zip(*(_of_point(one, sampling.seed) for one in runs), strict=True)
-    found = np.stack(values)  # (point, index and ends of its interval, kind, input)
-    return {
-        "first_order_index": found[:, 0, 0],
-        "first_order_interval": found[:, 1:, 0],
-        "total_index": found[:, 0, 1],
-        "total_interval": found[:, 1:, 1],
-        "sensitivity_status": np.array(status, np.int8),
-    }
+    found = {"sensitivity_status": np.array(status, np.int8)}
+    for at, kind in enumerate(("first_order", "total")):
+        own = np.stack(values)[:, :, at]  # (point, index and ends of its interval, input)
+        found |= {f"{kind}_index": own[:, 0], f"{kind}_interval": own[:, 1:]}
+    return found
 
 
 def _of_point(runs: Floats, seed: int) -> tuple[SensitivityStatus, Floats]:

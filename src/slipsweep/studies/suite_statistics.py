@@ -64,7 +64,7 @@ def suite_statistics(
         - `valueless_flag_count`, dimension `flag`: motions without a value, by reason.  One may have several.
         - `zero_probability`: share of displacements of `zero` at most.
         - `nonzero_median`, `nonzero_geometric_mean` (m) and `log_standard_deviation` (of natural logarithms, with
-          n - 1) of the others.
+          n - 1) of the others, which are described apart as by Bray and Travasarou [1]_.
         - `displacement_quantile` (m), dimension `quantile`, and `exceedance_probability`, dimension `threshold` (m):
           of all displacements, those that are zero, too.
 
@@ -79,10 +79,6 @@ def suite_statistics(
     --------
     displacement_hazard : with the seismic hazard of a site
     sample : statistics under uncertain inputs
-
-    Notes
-    -----
-    A share of zero displacements and the distribution of the others follows Bray and Travasarou [1]_.
 
     References
     ----------
@@ -104,8 +100,7 @@ def suite_statistics(
     for name in ("permanent_displacement", "validity"):
         if name not in result.data_vars:
             raise InputError(f"result: {name}: missing: must be there, of all motions")
-    dims = suite_dims(result["permanent_displacement"], over)
-    g = float(result.attrs.get("g", np.nan))
+    dims, g = suite_dims(result["permanent_displacement"], over), float(result.attrs.get("g", np.nan))
     limits, wanted = check_thresholds("thresholds", thresholds, g), check_increasing("quantiles", quantiles, "quantile")
     least = check_thresholds("zero", zero, g)
     if least.size > 1:
@@ -176,8 +171,8 @@ def suite_dims(values: xr.DataArray, over: Any = None) -> tuple[str, ...]:
     return tuple(dict.fromkeys(dims))
 
 
-def limit_quantiles(limits: xr.Dataset, quantiles: Any = QUANTILES) -> xr.Dataset:
-    """Quantiles of the limit amplitudes of a suite's motions, at every other grid point: `limit_amplitude`'s result.
+def limit_quantiles(limits: xr.Dataset) -> xr.Dataset:
+    """`QUANTILES` of the limit amplitudes of a suite's motions, at every other grid point: `limit_amplitude`'s result.
 
     A motion that does not reach the displacement up to the maximum amplitude has a limit above all others: a
     `limit_quantile` (m/s²) is infinite where too many do not.  Those without a value are left out of it, and of
@@ -188,8 +183,8 @@ def limit_quantiles(limits: xr.Dataset, quantiles: Any = QUANTILES) -> xr.Datase
     # so large that whatever is interpolated towards it is above all limits
     largest = np.finfo(np.float64).max / 4.0
     values = limits["limit_amplitude"].where(~beyond, largest)
-    wanted = check_increasing("quantiles", quantiles, "quantile")
-    found = _quantiles(values, wanted, dims)
+    quantiles = np.array(QUANTILES)
+    found = _quantiles(values, quantiles, dims)
     highest = values.where(~beyond).max()
     return xr.Dataset(
         {
@@ -197,7 +192,7 @@ def limit_quantiles(limits: xr.Dataset, quantiles: Any = QUANTILES) -> xr.Datase
             "value_count": values.count(dims),
             "not_reached_count": beyond.sum(dims),
         },
-        {"quantile": wanted},
+        {"quantile": quantiles},
         limits.attrs,
     )
 
@@ -246,10 +241,10 @@ def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100)
             shares[f"P(u > {d * 1000.0:.6g} mm)"] = column
     if (rows["valueless_share"] > 0.0).any():
         shares["no value"] = rows["valueless_share"][0]
-    for title, column in shares.items():
-        columns[title] = ["none" if np.isnan(one) else f"{one:.1%}" for one in column]
-    table = pd.DataFrame(columns).to_string(index=False).splitlines()
-    return [f"permanent displacement (mm) over {suite}:", *table]
+    columns |= {
+        title: ["none" if np.isnan(one) else f"{one:.1%}" for one in column] for title, column in shares.items()
+    }
+    return [f"permanent displacement (mm) over {suite}:", *pd.DataFrame(columns).to_string(index=False).splitlines()]
 
 
 def at_thresholds(found: xr.Dataset, thresholds: Thresholds) -> xr.Dataset:

@@ -20,10 +20,7 @@ from slipsweep.grid import inputs as grid_inputs
 from slipsweep.model import options, parameters, variables
 from slipsweep.motion.waveforms import Waveform
 from slipsweep.studies import datasets
-from slipsweep.studies.datasets import Values
-from slipsweep.studies.sampling import ENDS, SOBOL_MEMORY, Sampling, Thresholds, sobol_indices
-
-Floats = NDArray[np.float64]
+from slipsweep.studies.sampling import ENDS, SOBOL_MEMORY, Floats, Sampling, Thresholds, sobol_indices
 
 TITLE = "Permanent displacement of a rigid block under uncertain inputs"
 
@@ -53,6 +50,9 @@ _MODES = tuple(mode for mode in variables.SlidingMode if mode is not variables.S
 #: Parameters that have an estimate where they are not given, in the order in which each needs those before it.
 _ESTIMATED = ("yield_acceleration", "minimum_friction", "delta_mu", "decay_rate")
 
+#: Names that no dimension and no coordinate of a caller's may have.
+_TAKEN = {*variables.STATISTICS, *variables.STATISTIC_COORDINATES}
+
 #: A value that every parameter may have: the grid of those that are drawn is planned with it.
 _ANY = 0.5
 
@@ -68,12 +68,12 @@ _DRAW = "draw of the uncertain inputs"
 
 @datasets.naming_choices
 def sample(
-    theta: Values | None = None,
-    mu_s: Values | None = None,
-    amplitude: Values | None = None,
-    frequency: Values | None = None,
+    theta: datasets.Values | None = None,
+    mu_s: datasets.Values | None = None,
+    amplitude: datasets.Values | None = None,
+    frequency: datasets.Values | None = None,
     *,
-    phi: Values | None = None,
+    phi: datasets.Values | None = None,
     uncertain: Mapping[str, Any],
     excitation: datasets.Excitation = "sine",
     model: options.Model | str = "mendez",
@@ -86,18 +86,18 @@ def sample(
     correlation: Sequence[tuple[str, str, float]] = (),
     sensitivity: bool = False,
     over: str | Sequence[str] = (),
-    displacement_amplitude: Values | None = None,
-    scale: Values | None = None,
-    pgv: Values | None = None,
-    arias_intensity: Values | None = None,
-    time_scale: Values | None = None,
+    displacement_amplitude: datasets.Values | None = None,
+    scale: datasets.Values | None = None,
+    pgv: datasets.Values | None = None,
+    arias_intensity: datasets.Values | None = None,
+    time_scale: datasets.Values | None = None,
     polarity: datasets.Signs | None = None,
-    azimuth: Values | None = None,
-    yield_acceleration: Values | None = None,
-    yield_coefficient: Values | None = None,
-    decay_rate: Values | None = None,
-    delta_mu: Values | None = None,
-    minimum_friction: Values | None = None,
+    azimuth: datasets.Values | None = None,
+    yield_acceleration: datasets.Values | None = None,
+    yield_coefficient: datasets.Values | None = None,
+    decay_rate: datasets.Values | None = None,
+    delta_mu: datasets.Values | None = None,
+    minimum_friction: datasets.Values | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> xr.Dataset:
     """Quantiles and exceedance probabilities of the permanent displacement under uncertain inputs.
@@ -107,7 +107,7 @@ def sample(
     Parameters
     ----------
     theta, mu_s, amplitude, frequency : float, array or DataArray
-        As in `sweep`.  One that is drawn with ``kind="absolute"`` must not be given.
+        These and all parameters not named here as in `sweep`.  One drawn with ``kind="absolute"`` must not be given.
     uncertain : mapping of str to mapping or frozen distribution
         For any parameter but `polarity` and `azimuth` either a frozen distribution of scipy.stats, or a mapping with
 
@@ -136,8 +136,6 @@ def sample(
         Dimensions of the grid, such as ``["motion", "polarity"]`` of a suite, whose values are equally likely draws:
         each meets all samples, and statistics are over all of them together; by default each motion has its own.  Not
         with `sensitivity`, nor a dimension of `frequency` or `time_scale`.
-    yield_acceleration, decay_rate, delta_mu, minimum_friction : float, array or DataArray, optional
-        These and the remaining parameters as in `sweep`.
     progress : callable, optional
         Called with the number of samples just solved, from any thread.
 
@@ -197,11 +195,8 @@ def sample(
         correlation=correlation, sensitivity=sensitivity, over=over, g=options.MODELS.of(model).g,
     )  # fmt: skip
     plan = plan_samples(sampling, inputs, excitation=excitation, model=model, solver=solver)
-    coords = datasets.brought_coordinates(
-        inputs, plan.coords, {*variables.STATISTICS, *variables.STATISTIC_COORDINATES}
-    )
-    kept = {name: one for name, one in coords.items() if not {*sampling.over} & {*one.dims}}
-    return plan.solve(progress).assign_coords(kept)
+    coords = datasets.brought_coordinates(inputs, plan.coords, _TAKEN)
+    return plan.solve(progress).assign_coords(coords).drop_dims(sampling.over, errors="ignore")
 
 
 def plan_samples(
@@ -279,7 +274,7 @@ class SamplePlan(plans.Plan):
         if "displacement_amplitude" in {*inputs, *drawn}:
             inputs.pop("amplitude", None)  # A = ω²d
         sizes = grid_inputs.grid_sizes(inputs)
-        plans.check_dimensions(sizes, coords, {*variables.STATISTICS, *variables.STATISTIC_COORDINATES})
+        plans.check_dimensions(sizes, coords, _TAKEN)
         for dim in sampling.over:
             key = f"{sampling.keys}over = {parameters.shown(dim)}"
             if dim not in sizes:
@@ -376,10 +371,9 @@ class SamplePlan(plans.Plan):
         arrays, shape = self._drawn(chunk, sizes)
         names = ("permanent_displacement", "validity", *(["sliding_mode"] if "mode_share" in self.names else []))
         solved = engine.solve(engine.Request(self.problem, shape, arrays, names, progress))
-        runs = {name: values.reshape(math.prod(sizes.values()), -1) for name, values in solved.items()}
+        runs = [solved[name].reshape(math.prod(sizes.values()), -1) for name in names]
         # of Sobol indices the first runs are the samples
-        samples = {name: values[:, : self.samples] for name, values in runs.items()}
-        displacement, flags = samples["permanent_displacement"], samples["validity"]
+        displacement, flags, *modes = (values[:, : self.samples] for values in runs)
         clocks = self.frequency.isel(chunk, missing_dims="ignore").set_dims(sizes | self.scaled)
         frequency = clocks.values.reshape(len(displacement), -1)
         squares = frequency[..., np.newaxis] ** 2
@@ -411,10 +405,10 @@ class SamplePlan(plans.Plan):
             "flag_share": np.stack([np.mean(flags & flag.value != 0, axis=-1) for flag in variables.Validity], axis=-1),
             "valueless_share": np.isnan(displacement).mean(axis=-1),
         }
-        if "sliding_mode" in samples:
-            found["mode_share"] = np.stack([np.mean(samples["sliding_mode"] == mode, axis=-1) for mode in _MODES], -1)
+        for codes in modes:
+            found["mode_share"] = np.stack([np.mean(codes == mode, axis=-1) for mode in _MODES], axis=-1)
         if sampling.sensitivity:
-            found |= sobol_indices(sampling, runs["permanent_displacement"])
+            found |= sobol_indices(sampling, runs[0])
         return found
 
     def _drawn(self, chunk: chunks.Chunk, sizes: dict[str, int]) -> tuple[dict[str, Floats], tuple[int, ...]]:
@@ -422,17 +416,14 @@ class SamplePlan(plans.Plan):
         inputs = {name: one.isel(chunk, missing_dims="ignore") for name, one in self.inputs.items()}
         sizes = sizes | self.pooled | {_DRAW: self.sampling.runs}
         drawn = {name: xr.Variable((_DRAW,), draws) for name, draws in self.sampling.draws.items()}
-        about_estimates = []
         for name, one in self.sampling.distributions.items():
             if name in inputs or one.kind == "absolute":
-                inputs[name] = one.applied(inputs.get(name), drawn[name])
-            else:
-                about_estimates.append(name)
+                inputs[name] = one.applied(inputs.get(name), drawn.pop(name))
         if "phi" in inputs:
             inputs["mu_s"] = parameters.friction_coefficient(inputs.pop("phi"))
         arrays = grid_inputs.aligned(inputs, sizes)
-        for name in sorted(about_estimates, key=_ESTIMATED.index):
-            one, draws = self.sampling.distributions[name], grid_inputs.aligned({name: drawn[name]}, sizes)[name]
+        for name in (one for one in _ESTIMATED if one in drawn):
+            one, draws = self.sampling.distributions[name], grid_inputs.aligned(drawn, sizes)[name]
             # Coulomb's yield acceleration depends on no shaking, which a record has of its own
             every = {"amplitude": np.zeros((1,) * draws.ndim), **arrays}
             shape = np.broadcast_shapes(*(values.shape for values in every.values()))
