@@ -23,7 +23,7 @@ import numpy as np
 sys.path.insert(0, sys.argv[1])
 from ofown import kernel_of_own
 from slipsweep.jit import compiling
-print(kernel_of_own(np.arange(6.0)), compiling.seconds() > 0.0)
+print(kernel_of_own(np.arange(6.0)), compiling.seconds > 0.0)
 """
 
 MODULE = """

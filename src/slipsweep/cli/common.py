@@ -107,7 +107,8 @@ def progress_bar(cells: int, quiet: bool, unit: str = "cells") -> Iterator[Calla
         yield None
         return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, Progress, ProgressColumn, Task, TaskProgressColumn, TimeRemainingColumn
+    from rich.text import Text
 
     from slipsweep.jit import compiling
 
@@ -117,11 +118,15 @@ def progress_bar(cells: int, quiet: bool, unit: str = "cells") -> Iterator[Calla
         done = bar.tasks[task].completed + more
         bar.update(task, completed=done, description=f"{done / passed()[0]:.3g} {unit}/s")
 
-    def compiled(kernel: str | None) -> None:
-        bar.update(task, description=f"compiling for this processor, once: {kernel}" if kernel else "")
+    class Doing(ProgressColumn):
+        """How fast cells are solved, or which kernel is compiled."""
 
-    columns = (BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), TextColumn("{task.description}"))
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar, compiling.watched(compiled):
+        def render(self, task: Task) -> Text:
+            now = compiling.compiled_now
+            return Text(f"compiling for this processor, once: {now}" if now else task.description)
+
+    columns = (BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), Doing())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=cells)
         yield advance
 
@@ -130,10 +135,10 @@ def stopwatch() -> Callable[[], tuple[float, float]]:
     """What tells the seconds since now: those without compilation, which are never 0, and those of compilation."""
     from slipsweep.jit import compiling
 
-    started, before = time.perf_counter(), compiling.seconds()
+    started, before = time.perf_counter(), compiling.seconds
 
     def passed() -> tuple[float, float]:
-        once = compiling.seconds() - before
+        once = compiling.seconds - before
         return max(time.perf_counter() - started - once, 1e-9), once
 
     return passed

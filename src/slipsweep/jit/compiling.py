@@ -17,7 +17,7 @@ import shutil
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -34,12 +34,11 @@ _KEPT = 4
 #: Seconds to wait for another process that compiles.
 _PATIENCE = 300.0
 
-#: Called when this process begins to compile, with the kernel's name, and with None when it is done.
-Watcher = Callable[[str | None], None]
+#: Seconds that this process has spent compiling, and the kernel that it compiles now.
+seconds = 0.0
+compiled_now: str | None = None
 
 _compiling = threading.Lock()
-_watchers: list[Watcher] = []
-_seconds = 0.0
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -79,7 +78,7 @@ def _compiled(function: Callable[..., Any], types: tuple[Any, ...]) -> Any:
 
 
 def _compiled_in(folder: Path | None, function: Callable[..., Any], types: tuple[Any, ...]) -> Any:
-    global _seconds
+    global seconds, compiled_now
     given, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
     try:
         compiled: Any = part("arcp", cache=folder is not None)(function)
@@ -88,15 +87,11 @@ def _compiled_in(folder: Path | None, function: Callable[..., Any], types: tuple
     if folder is not None and any(folder.glob(f"**/*.{function.__name__}-*.nbi")):
         compiled.compile(types)
         return compiled
-    started, told = time.perf_counter(), [*_watchers]
-    for watcher in told:
-        watcher(function.__name__)
+    started, compiled_now = time.perf_counter(), function.__name__
     try:
         compiled.compile(types)
     finally:
-        _seconds += time.perf_counter() - started
-        for watcher in told:
-            watcher(None)
+        seconds, compiled_now = seconds + time.perf_counter() - started, None
     return compiled
 
 
@@ -126,18 +121,3 @@ def _digest_of_sources() -> str:
     sources = [path for room in ("model", "jit", "kernels") for path in (package / room).rglob("*.py")]
     contents = (path.read_bytes() for path in sorted([*sources, package / "motion" / "pieces.py"]))
     return hashlib.sha256(b"".join(contents)).hexdigest()[:16]
-
-
-def seconds() -> float:
-    """Seconds that this process has spent compiling."""
-    return _seconds
-
-
-@contextlib.contextmanager
-def watched(watcher: Watcher) -> Iterator[None]:
-    """Call `watcher` when a kernel is compiled within the block, in any thread."""
-    _watchers.append(watcher)
-    try:
-        yield
-    finally:
-        _watchers.remove(watcher)

@@ -11,8 +11,6 @@ import numpy as np
 
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels.block import (
-    FRICTION_ESTIMATED,
-    NEAR_MODE_LIMIT,
     NEWMARK,
     NO_VALUE,
     UNSOLVED,
@@ -49,13 +47,6 @@ def first_pulse(block: Block, wave: Wave, k: int) -> int:
     while k < wave.height.size and block.amplitude * wave.height[k] <= block.yield_acceleration:
         k += 1
     return k
-
-
-@scalar
-def validity_before(validity: int, block: Block, wave: Wave) -> int:
-    """The flags known before the motion; ramps may keep the shaking below its peak, and a block from sliding."""
-    slides = block.amplitude * wave.highest > block.yield_acceleration
-    return validity if slides else validity & ~(NEAR_MODE_LIMIT | FRICTION_ESTIMATED)
 
 
 @scalar

@@ -10,6 +10,8 @@ from typing import Any
 
 from slipsweep.jit.decorators import scalar, single
 from slipsweep.kernels.block import (
+    FRICTION_ESTIMATED,
+    NEAR_MODE_LIMIT,
     NO_VALUE,
     NOT_RECOUPLED,
     UNSOLVED,
@@ -21,7 +23,7 @@ from slipsweep.kernels.block import (
     block_of,
     interface_of,
 )
-from slipsweep.kernels.pulse import Pulse, first_pulse, motion_of, validity_before
+from slipsweep.kernels.pulse import Pulse, first_pulse, motion_of
 from slipsweep.model import equations as eq
 from slipsweep.model.friction import FrictionLaw
 from slipsweep.motion.pieces import Wave
@@ -130,11 +132,13 @@ def cell_solver_of(
         """The response of a cell of any law that gives what the solver takes of it (`FrictionLaw.missing`)."""
         interface = interface_of(cell, options.rise, options.g)
         block, mode = block_of(law, cell.amplitude, cell, interface, options), interface.sliding_mode
-        validity, unknown = validity_before(interface.validity, block, wave), math.nan if mode < 0 else 0.0
+        # ramps may keep the shaking below its peak, and a block from sliding
+        slides, unknown = block.amplitude * wave.highest > block.yield_acceleration, math.nan if mode < 0 else 0.0
+        validity = interface.validity if slides else interface.validity & ~(NEAR_MODE_LIMIT | FRICTION_ESTIMATED)
         found = Pulse(0.0, unknown, unknown, 0.0, 0.0, 0)
         if mode == eq.CONTINUOUS:
             found = slide_continuously(block, options, wave, workspace)
-        elif mode == eq.STICK_SLIP and block.amplitude * wave.highest > block.yield_acceleration:
+        elif mode == eq.STICK_SLIP and slides:
             validity |= YIELD_GOVERNS if yield_governs(block, wave) else 0
             found = train(block, options, wave, workspace)
         return motion_of(block, mode, validity, found)
