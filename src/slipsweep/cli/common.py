@@ -108,6 +108,7 @@ def progress_bar(cells: int, quiet: bool, unit: str = "cells") -> Iterator[Calla
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, ProgressColumn, Task, TaskProgressColumn, TimeRemainingColumn
+    from rich.table import Column
     from rich.text import Text
 
     from slipsweep.jit import compiling
@@ -125,7 +126,7 @@ def progress_bar(cells: int, quiet: bool, unit: str = "cells") -> Iterator[Calla
             now = compiling.compiled_now
             return Text(f"compiling for this processor, once: {now}" if now else task.description)
 
-    columns = (BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), Doing())
+    columns = (BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), Doing(Column(no_wrap=True)))
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=cells)
         yield advance
