@@ -114,8 +114,9 @@ def test_each_parameter_and_kind(name: str, kind: str) -> None:
         # where Eq. 4 governs, with λ by Eq. 6
         del given["decay_rate"]
         given["yield_acceleration"] = 0.6
-    if name == "phi":
+    if name == "phi":  # Coulomb's yield acceleration follows it
         given["phi"] = np.degrees(np.arctan(given.pop("mu_s")))
+        del given["yield_acceleration"]
     if name == "yield_coefficient":
         given = {"amplitude": 5.0, "frequency": 2.0, "yield_coefficient": 0.25, "model": "newmark"}
     base = given[name]
