@@ -38,8 +38,8 @@ SMOOTH = ("stick_slip", "continuous", "measured_yield", "newmark", "integrate", 
 
 def scaled_displacements(waveform: Waveform, rule: str, steps_per_cycle: int, **given: Any) -> np.ndarray:
     """W = ω²u of one or more yield accelerations."""
-    given = choices(**given, frequency=1.0) | {"excitation": waveform, "solver": Step(rule, steps_per_cycle)}
-    found = slipsweep.sweep(**given, variables=["permanent_displacement"])
+    given |= {"frequency": 1.0, "solver": "step", "rule": rule, "steps_per_cycle": steps_per_cycle}
+    found = slipsweep.sweep(**choices(**given, excitation=waveform), variables=["permanent_displacement"])
     return np.asarray((2 * pi) ** 2 * found.permanent_displacement)
 
 
