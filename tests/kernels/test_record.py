@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import xarray as xr
 from mpmath import mpf, workdps
-from numba import njit
 
 import slipsweep
 from slipsweep import InputError, Record, sweep
+from slipsweep.jit.compiling import kernel
 from slipsweep.kernels.block import MONOTONE, Cell, block_of, interface_of
 from slipsweep.kernels.eq4 import eq4_integrals
 from slipsweep.model.friction import exponential
@@ -50,7 +50,7 @@ def shaking() -> Record:
 # ------------------------------------------------------------------------- a linear piece
 
 
-@njit
+@kernel
 def _followed(cell: tuple[float, float, float, float, float, float, float], pieces: np.ndarray) -> tuple[float, float]:
     block = block_of(exponential(), Cell(*cell), interface_of(Cell(*cell), MONOTONE, G), MONOTONE, G)
     return eq4_integrals(block, pieces[0], pieces[0].begin, pieces[0].finish)
@@ -411,10 +411,11 @@ def test_mendez_held_at_yield_is_newmark(shaking: Record) -> None:
     assert (int(mendez.validity), int(newmark.validity)) == (slipsweep.Validity.YIELD_GOVERNS, 0)
 
 
-def test_uplift_on_the_way_down_takes_the_value() -> None:
-    """n = g + Üg tan θ < 0 where the base's acceleration is upslope."""
-    lifted = sweep(20.0, 0.6, excitation=Record(np.array([0.0, 1.0, 2.0]), np.array([0.0, -40.0, 0.0])))
-    assert int(lifted.validity) == slipsweep.Validity.UPLIFT
+def test_only_an_acceleration_up_the_slope_lifts_the_block() -> None:
+    """n = g + Üg tan θ ≤ 0: a peak beyond g / tan θ in the other direction has a value, that of the reference."""
+    record, cell = Record.sampled([0.0, 0.0, 30.0, 0.0], 0.05), {"theta": 20.0, "mu_s": 0.6}
+    assert assert_is_reference(record, cell).continuous_pulses == 1
+    assert int(sweep(20.0, 0.6, excitation=record, polarity=-1).validity) == slipsweep.Validity.UPLIFT
 
 
 def test_dimensions(shaking: Record) -> None:

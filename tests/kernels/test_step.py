@@ -4,7 +4,6 @@ from collections.abc import Iterable, Sequence
 from math import asin, cos, isfinite, pi, radians, sin, sqrt, tan
 from typing import Any
 
-import numba
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -12,7 +11,8 @@ from scipy.optimize import brentq
 
 import slipsweep
 from slipsweep import Step
-from slipsweep.jit.decorators import inlined
+from slipsweep.jit.compiling import kernel
+from slipsweep.jit.decorators import inlined, registered
 from slipsweep.kernels.block import EQ12, INTEGRATE, MONOTONE, Cell, Motion, Options
 from slipsweep.kernels.step import solve_cell
 from slipsweep.model.friction import FrictionLaw
@@ -220,21 +220,23 @@ def test_eq12_by_hand() -> None:
 # ------------------------------------------------------------------ another law
 
 
-@inlined
+@registered  # so that the kernel is kept for the next run
 def hyperbolic_friction(x: float, mu_s: float, delta_mu: float, decay_rate: float, g: float) -> float:
     return mu_s / (1.0 + decay_rate * abs(x) / g)
 
 
-HYPERBOLIC = FrictionLaw(friction=hyperbolic_friction)
+@inlined
+def hyperbolic() -> FrictionLaw:
+    return FrictionLaw(hyperbolic_friction)
 
 
 def test_a_law_says_what_it_lacks_for_the_exact_kernel() -> None:
-    assert HYPERBOLIC.missing == ("derivatives", "inflection", "static_acceleration", "moments", "decay_length")
+    assert FrictionLaw(hyperbolic_friction).missing == FrictionLaw._fields[1:]
 
 
-@numba.njit(error_model="numpy")
+@kernel
 def solve_hyperbolic(cell: Cell, options: Options, wave: Any, steps: Steps) -> Motion:
-    return solve_cell(HYPERBOLIC, cell, options, wave, steps)
+    return solve_cell(hyperbolic(), cell, options, wave, steps)
 
 
 class Hyperbolic:
