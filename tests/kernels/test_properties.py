@@ -236,15 +236,24 @@ AXES: dict[str, Any] = {
     "amplitude": np.array([0.0, 0.5, 1.25, 2.0, 3.5, 5.0, 7.5, 11.0, 16.0, 23.0]),
     "frequency": np.array([0.5, 1.0, 4.0]),
 }
-WRITTEN = pytest.mark.parametrize(
-    "options",
-    [
+
+
+@pytest.fixture(
+    scope="module",
+    params=[
         {"solver": "cycle", "cycles": 3},
         {"solver": "cycle", "yield_acceleration": 0.375, "rise": "literal"},
         {"solver": "step", "steps_per_cycle": 128},
     ],
     ids=["batches", "walk", "step"],
 )
+def options(request: pytest.FixtureRequest) -> dict[str, Any]:
+    return dict(request.param)
+
+
+@pytest.fixture(scope="module")
+def expected(options: dict[str, Any]) -> xr.Dataset:
+    return slipsweep.sweep(**choices(**AXES, **options))
 
 
 def test_axes_hold_every_mode_and_the_flags() -> None:
@@ -254,7 +263,6 @@ def test_axes_hold_every_mode_and_the_flags() -> None:
     assert np.bitwise_or.reduce(result.validity.to_numpy(), axis=None) & 0b11011 == 0b11011
 
 
-@WRITTEN
 def test_accelerations_scale(options: dict[str, Any]) -> None:
     """With A, Uy and g doubled, u and v double, bit by bit."""
     given: dict[str, Any] = {**AXES, **options, "g": strategies.G}
@@ -264,18 +272,14 @@ def test_accelerations_scale(options: dict[str, Any]) -> None:
         np.testing.assert_array_equal(two[name], factor * one[name], err_msg=name)
 
 
-@WRITTEN
-def test_integers_and_single_precision_mean_the_same(options: dict[str, Any]) -> None:
-    expected = slipsweep.sweep(**choices(**AXES, **options))
+def test_integers_and_single_precision_mean_the_same(options: dict[str, Any], expected: xr.Dataset) -> None:
     single: dict[str, Any] = {name: values.astype(np.float32) for name, values in AXES.items()}
     assert_same(slipsweep.sweep(**choices(**single, **options)), expected)
     whole: dict[str, Any] = {**AXES, "theta": AXES["theta"].astype(int), "frequency": [1, 4]}
     assert_same(slipsweep.sweep(**choices(**whole, **options)), expected.isel(frequency=[1, 2]))
 
 
-@WRITTEN
-def test_order_of_values_does_not_matter(options: dict[str, Any]) -> None:
-    expected = slipsweep.sweep(**choices(**AXES, **options))
+def test_order_of_values_does_not_matter(options: dict[str, Any], expected: xr.Dataset) -> None:
     generator = np.random.default_rng(12)
     orders = {name: generator.permutation(values.size) for name, values in AXES.items()}
     shuffled = slipsweep.sweep(**choices(**{name: values[orders[name]] for name, values in AXES.items()}, **options))
@@ -284,9 +288,7 @@ def test_order_of_values_does_not_matter(options: dict[str, Any]) -> None:
     assert_same(slipsweep.sweep(**choices(**strided, **options)), expected)
 
 
-@WRITTEN
-def test_order_of_dimensions_does_not_matter(options: dict[str, Any]) -> None:
-    expected = slipsweep.sweep(**choices(**AXES, **options))
+def test_order_of_dimensions_does_not_matter(options: dict[str, Any], expected: xr.Dataset) -> None:
     theta, amplitude = xr.broadcast(
         xr.DataArray(AXES["theta"], dims="row"), xr.DataArray(AXES["amplitude"], dims="column")
     )
@@ -296,21 +298,17 @@ def test_order_of_dimensions_does_not_matter(options: dict[str, Any]) -> None:
         assert_same(result.transpose("row", "mu_s", "column", "frequency"), expected)
 
 
-@WRITTEN
-def test_zipped_is_the_diagonal_of_crossed(options: dict[str, Any]) -> None:
-    crossed = slipsweep.sweep(**choices(**AXES, **options))
+def test_zipped_is_the_diagonal_of_crossed(options: dict[str, Any], expected: xr.Dataset) -> None:
     grid = np.meshgrid(*AXES.values(), indexing="ij")
     zipped: dict[str, Any] = {
         name: xr.DataArray(values.reshape(-1), dims="case") for name, values in zip(AXES, grid, strict=True)
     }
     result = slipsweep.sweep(**choices(**zipped, **options))
     assert result.permanent_displacement.dims == ("case",)
-    assert_same(result, crossed.stack(case=list(AXES)))
+    assert_same(result, expected.stack(case=list(AXES)))
 
 
-@WRITTEN
-def test_one_cell_is_a_cell_of_the_grid(options: dict[str, Any]) -> None:
-    expected = slipsweep.sweep(**choices(**AXES, **options))
+def test_one_cell_is_a_cell_of_the_grid(options: dict[str, Any], expected: xr.Dataset) -> None:
     for at in ((0, 1, 5, 1), (1, 1, 6, 2), (3, 2, 4, 0), (4, 3, 8, 2), (2, 0, 2, 1)):
         index = dict(zip(AXES, at, strict=True))
         cell: strategies.Cell = {name: float(AXES[name][i]) for name, i in index.items()}
