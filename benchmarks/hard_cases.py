@@ -10,6 +10,7 @@ from statistics import median
 from typing import Any
 
 import numpy as np
+from mpmath import mpf
 
 from benchmarks.machine import DOCS, cores, number, table
 from tests.support.cases import DATA, OPTIONAL_INPUTS, PARAMETERS, Case, Found, read_cases, solve
@@ -47,13 +48,6 @@ def span(values: list[float]) -> str:
     return low if low == high else f"{low} – {high}"
 
 
-def relative_conditioning(case: Case) -> float:
-    """The bound over the answer."""
-    from mpmath import mpf
-
-    return float(mpf(case.displacement_bound) / abs(mpf(case.permanent_displacement)))
-
-
 def errors_table(cases: list[Case], answers: dict[str, dict[int, Found]]) -> str:
     """A line a category: conditioning, and the errors of every solver in units of it."""
     rows = []
@@ -61,7 +55,8 @@ def errors_table(cases: list[Case], answers: dict[str, dict[int, Found]]) -> str
         own = [case for case in cases if case.category == name]
         moving = [case for case in own if float(case.permanent_displacement or "0")]
         row = [name.replace("_", " "), len(own)]
-        row.append(span([relative_conditioning(case) for case in moving]) if moving else "at rest")
+        relative = [float(mpf(case.displacement_bound) / abs(mpf(case.permanent_displacement))) for case in moving]
+        row.append(span(relative) if relative else "at rest")
         for found in answers.values():
             answered = [case for case in own if case.sliding_mode >= 0]
             kept = [float(np.dtype(dtype_of(name)).type(found[case.case][0])) for case in answered]  # as in a file
