@@ -51,10 +51,6 @@ class Group:
         inputs = {name: values[cells] for name, values in self.inputs.items()}
         return Group(self.regime, self.model, inputs, self.reference[cells])
 
-    def repeated(self, times: int) -> "Group":
-        """The group `times` times over."""
-        return self.take(np.tile(np.arange(self.size), times))
-
     def displacement(self, solver: Any) -> Array:
         """What a solver of `slipsweep.sweep` gives."""
         given = {name: values for name, values in self.inputs.items() if not np.isnan(values).all()}
