@@ -8,7 +8,6 @@ table's among them, or a converter of 12 bits and no other noise.  Writes calibr
 import multiprocessing
 import os
 from concurrent.futures import ProcessPoolExecutor
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -85,16 +84,14 @@ def report(results: dict[tuple[str, str], np.ndarray]) -> str:
         held, bounded = found.mean(axis=0).T
         shares = [f"{100 * share:.1f} % ({100 * known:.0f} %)" for share, known in zip(held, bounded, strict=True)]
         rows.append([KINDS[kind], noise, len(found), *shares])
-    return "\n".join(
-        [
-            measured_on(("numpy", "scipy", "numba"), timed=False) + "\n",
-            "Share of tests whose 95 % interval holds the true value; in brackets the share whose interval has both "
-            "ends. *White*: noise of 1 % of each channel's peak, the table's among them. *12 bits*: a converter of 12 "
-            f"bits and no other noise. {CYCLES} cycles, {RATE} samples a second, all four channels; θ 0 to 14°, μs 0.2 "
-            "to 0.6, λ 0.5 to 6, Δμ up to 0.4 μs, A 1.5 to 9 m/s², A/Üy 1.2 to 5, 1 to 4 Hz. By `python -m "
-            f"benchmarks.calibration --repetitions {rows[0][2]}`.\n",
-            table(["tests", "noise", "number", "Üy", "λ", "Δμ"], rows),
-        ]
+    return (
+        f"{measured_on(('numpy', 'scipy', 'numba'), timed=False)}\n\n"
+        "Share of tests whose 95 % interval holds the true value; in brackets the share whose interval has both "
+        "ends. *White*: noise of 1 % of each channel's peak, the table's among them. *12 bits*: a converter of 12 "
+        f"bits and no other noise. {CYCLES} cycles, {RATE} samples a second, all four channels; θ 0 to 14°, μs 0.2 "
+        "to 0.6, λ 0.5 to 6, Δμ up to 0.4 μs, A 1.5 to 9 m/s², A/Üy 1.2 to 5, 1 to 4 Hz. By `python -m "
+        f"benchmarks.calibration --repetitions {rows[0][2]}`.\n\n"
+        + table(["tests", "noise", "number", "Üy", "λ", "Δμ"], rows)
     )
 
 
@@ -116,7 +113,7 @@ def main() -> None:
         kind: np.array([result for task, result in zip(tasks, found, strict=True) if task[:2] == kind])
         for kind in kinds
     }
-    Path(given.folder / "calibration.md").write_text(report(results), encoding="utf-8")
+    (given.folder / "calibration.md").write_text(report(results), encoding="utf-8")
 
 
 if __name__ == "__main__":

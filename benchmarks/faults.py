@@ -16,11 +16,10 @@ ROUNDS = 50
 def main() -> None:
     """Do the rounds, and write the table."""
     given = machine.arguments(__doc__)
-    rounds = 1 if given.tiny else ROUNDS
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         whole = prepared(folder)
-        for number in range(rounds):
+        for number in range(1 if given.tiny else ROUNDS):
             for fault, tried in FAULTS.items():
                 tried(folder, OUTPUTS[number % 2], whole, random.Random(number))
                 print(number + 1, fault, flush=True)

@@ -10,27 +10,27 @@ from statistics import median
 from typing import Any
 
 import numpy as np
+from mpmath import mpf
 
 from benchmarks.machine import DOCS, cores, number, table
 from tests.support.cases import DATA, OPTIONAL_INPUTS, PARAMETERS, Case, Found, read_cases, solve
-from tests.support.hard_cells import CATEGORIES, G, conditioning
+from tests.support.hard_cells import CATEGORIES, G, conditioning, dtype_of
 
 STEPPED = [(rule, steps) for rule in ("trapezoid", "simpson") for steps in (1024, 4096)]
 
 
-def row_of(work: tuple[int, str, str, dict[str, Any]]) -> dict[str, Any]:
+def row_of(number_of_case: int, category: str, cell: dict[str, Any]) -> dict[str, Any]:
     """One line of hard_cases.csv."""
-    number_of_case, category, dtype, cell = work
     defaults = {"model": "mendez", "rise": "monotone", "recoupling": "eq12", "g": G}
-    return {"case": number_of_case, "category": category, **defaults, **cell, **conditioning(cell, dtype)}
+    found = conditioning(cell, dtype_of(category))
+    return {"case": number_of_case, "category": category, **defaults, **cell, **found}
 
 
 def write_cases() -> None:
     """Solve every cell and its neighbours, and write hard_cases.csv."""
-    cells = [(category, cell) for category in CATEGORIES for cell in category.cells()]
-    work = [(i, category.name, category.dtype, cell) for i, (category, cell) in enumerate(cells)]
+    names, cells = zip(*((category.__name__, cell) for category in CATEGORIES for cell in category()), strict=True)
     with ProcessPoolExecutor(cores()) as pool:
-        rows = list(pool.map(row_of, work))
+        rows = list(pool.map(row_of, range(len(cells)), names, cells))
     columns = [
         *("case", "category", "model", "rise", "recoupling", *PARAMETERS, "cycles", "g", *OPTIONAL_INPUTS),
         *("permanent_displacement", "displacement_bound", "peak_relative_velocity", "velocity_bound"),
@@ -48,24 +48,18 @@ def span(values: list[float]) -> str:
     return low if low == high else f"{low} – {high}"
 
 
-def relative_conditioning(case: Case) -> float:
-    """The bound over the answer."""
-    from mpmath import mpf
-
-    return float(mpf(case.displacement_bound) / abs(mpf(case.permanent_displacement)))
-
-
 def errors_table(cases: list[Case], answers: dict[str, dict[int, Found]]) -> str:
     """A line a category: conditioning, and the errors of every solver in units of it."""
     rows = []
-    for category in CATEGORIES:
-        own = [case for case in cases if case.category == category.name]
+    for name in (category.__name__ for category in CATEGORIES):
+        own = [case for case in cases if case.category == name]
         moving = [case for case in own if float(case.permanent_displacement or "0")]
-        row = [category.name.replace("_", " "), len(own)]
-        row.append(span([relative_conditioning(case) for case in moving]) if moving else "at rest")
+        row = [name.replace("_", " "), len(own)]
+        relative = [float(mpf(case.displacement_bound) / abs(mpf(case.permanent_displacement))) for case in moving]
+        row.append(span(relative) if relative else "at rest")
         for found in answers.values():
             answered = [case for case in own if case.sliding_mode >= 0]
-            kept = [float(np.dtype(category.dtype).type(found[case.case][0])) for case in answered]  # as in a file
+            kept = [float(np.dtype(dtype_of(name)).type(found[case.case][0])) for case in answered]  # as in a file
             times = [case.times_bounds((one, 0.0, 0, 0))[0] for case, one in zip(answered, kept, strict=True)]
             row.append(f"{number(median(times), 2)}, {number(max(times), 2)}")
         rows.append(row)
@@ -80,7 +74,7 @@ def main() -> None:
     answers = {"cycle": solve(cases, solver="cycle")}
     for rule, steps in STEPPED:
         answers[f"{rule}, {steps}"] = solve(cases, solver="step", rule=rule, steps_per_cycle=steps)
-    dangers = [[category.name.replace("_", " "), category.danger] for category in CATEGORIES]
+    dangers = [[one.__name__.replace("_", " "), (one.__doc__ or "").rstrip(".")] for one in CATEGORIES]
     (DOCS / "hard-cases.md").write_text(f"""# Hard cases
 
 Cases with the largest effects of rounding, and the errors of the solvers in them. Written by

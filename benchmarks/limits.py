@@ -56,10 +56,8 @@ def _group(rng: np.random.Generator, count: int, options: dict[str, Any], yields
 
 
 def _rules(rng: np.random.Generator) -> dict[str, Any]:
-    return {
-        "rise": str(rng.choice(["monotone", "literal"])),
-        "recoupling": str(rng.choice(["eq12", "integrate"])),
-    }
+    rise, recoupling = rng.choice(["monotone", "literal"]), rng.choice(["eq12", "integrate"])
+    return {"rise": str(rise), "recoupling": str(recoupling)}
 
 
 def any_wave(rng: np.random.Generator, count: int) -> Group:

@@ -51,18 +51,11 @@ def measured_on(packages: Iterable[str] = ("numpy", "numba", "xarray"), timed: b
     return f"Measured on {processor()}; {platform.system()}, {versions(packages)}, slipsweep {__version__}.{busy}"
 
 
-def alternate(
-    functions: Mapping[str, Callable[[], object]],
-    repeats: int,
-    typical: Callable[[Sequence[float]], float] = statistics.median,
-    calls: int = 1,
-    clock: Callable[[], float] = time.perf_counter,
-) -> dict[str, float]:
-    """Median (or other `typical`) seconds of each function, called in turn `repeats` times after an unmeasured call.
+def alternate(functions: Mapping[str, Callable[[], object]], repeats: int, calls: int = 1) -> dict[str, float]:
+    """Median seconds of each function, called in turn `repeats` times after an unmeasured call.
 
-    Seconds are those of `clock`.  Taking turns puts a slow spell of a shared machine on all of them alike.  The best of
-    `calls` at a turn counts: the first of them may have to get memory from the host of a virtual machine, at up to
-    2.5 µs for 4 KB.
+    Taking turns puts a slow spell of a shared machine on all of them alike.  The best of `calls` at a turn counts: the
+    first of them may have to get memory from the host of a virtual machine, at up to 2.5 µs for 4 KB.
     """
     for function in functions.values():
         function()
@@ -72,12 +65,12 @@ def alternate(
             gc.collect()
             best = math.inf
             for _ in range(calls):
-                start = clock()
+                start = time.perf_counter()
                 result = function()
-                best = min(best, clock() - start)
+                best = min(best, time.perf_counter() - start)
                 del result  # outside the clock, before the next allocation
             taken[name].append(best)
-    return {name: typical(times) for name, times in taken.items()}
+    return {name: statistics.median(times) for name, times in taken.items()}
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

@@ -22,8 +22,6 @@ from benchmarks.grids import REGIMES, design_grid, regime_box
 from benchmarks.machine import ROOT, alternate, arguments, cores, measured_on, number, table
 from slipsweep.motion.waveforms import Waveform
 
-_ONLY: dict[str, Any] = {"variables": ["permanent_displacement"]}
-
 WAVES: dict[str, Waveform] = {
     "sine": slipsweep.Sine(),
     "cosine": slipsweep.Cosine(),
@@ -38,7 +36,7 @@ WAVES: dict[str, Waveform] = {
 
 def displacement(**options: Any) -> xr.DataArray:
     """`slipsweep.sweep` of nothing but the permanent displacement."""
-    return slipsweep.sweep(**options, **_ONLY).permanent_displacement
+    return slipsweep.sweep(**options, variables=["permanent_displacement"]).permanent_displacement
 
 
 def size_of(grid: Mapping[str, Any]) -> int:

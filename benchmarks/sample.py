@@ -6,11 +6,13 @@ range of the design chart and 1 % clear of the regime's ends; the hard ones are 
 categories of tests/data/cases.csv that the default options can take.  tests/test_benchmarks.py solves some again.
 """
 
-import csv
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
+import xarray as xr
 from numpy.typing import NDArray
 
 import slipsweep
@@ -24,14 +26,14 @@ INPUTS = ("theta", "mu_s", "amplitude", "frequency", "yield_acceleration", "deca
 Array = NDArray[np.float64]
 
 
+@dataclass(frozen=True)
 class Group:
-    """Cells of one regime, model and sliding mode."""
+    """Cells of one regime, model and sliding mode; NaN where an input is not given."""
 
-    def __init__(self, rows: list[dict[str, str]]) -> None:
-        self.regime, self.model = rows[0]["regime"], rows[0]["model"]
-        self.mode = int(rows[0]["sliding_mode"])
-        self.inputs: dict[str, Array] = {name: np.array([float(row[name] or "nan") for row in rows]) for name in INPUTS}
-        self.reference = np.array([float(row["permanent_displacement"]) for row in rows])
+    regime: str
+    model: str
+    inputs: dict[str, Array]
+    reference: Array
 
     @property
     def size(self) -> int:
@@ -46,39 +48,23 @@ class Group:
 
     def take(self, cells: NDArray[np.int_]) -> "Group":
         """The group of those cells, in that order, as often as they are named."""
-        part = object.__new__(Group)
-        part.regime, part.model, part.mode = self.regime, self.model, self.mode
-        part.inputs = {name: values[cells] for name, values in self.inputs.items()}
-        part.reference = self.reference[cells]
-        return part
-
-    def repeated(self, times: int) -> "Group":
-        """The group `times` times over."""
-        return self.take(np.tile(np.arange(self.size), times))
-
-    def sweep_arguments(self) -> dict[str, Any]:
-        """Arguments of `slipsweep.sweep`: the cells along one dimension."""
-        import xarray as xr
-
-        given = {name: values for name, values in self.inputs.items() if not np.isnan(values).all()}
-        cells = {name: xr.DataArray(values, dims="cell") for name, values in given.items()}
-        return {**cells, "model": self.model, "excitation": slipsweep.Sine(1), "variables": ["permanent_displacement"]}
+        inputs = {name: values[cells] for name, values in self.inputs.items()}
+        return Group(self.regime, self.model, inputs, self.reference[cells])
 
     def displacement(self, solver: Any) -> Array:
         """What a solver of `slipsweep.sweep` gives."""
-        return np.asarray(slipsweep.sweep(**self.sweep_arguments(), solver=solver).permanent_displacement)
+        given = {name: values for name, values in self.inputs.items() if not np.isnan(values).all()}
+        cells: dict[str, Any] = {name: xr.DataArray(values, dims="cell") for name, values in given.items()}
+        options: dict[str, Any] = {"model": self.model, "solver": solver, "variables": ["permanent_displacement"]}
+        return slipsweep.sweep(**cells, **options, excitation=slipsweep.Sine(1)).permanent_displacement.to_numpy()
 
 
 def read() -> dict[str, list[Group]]:
     """Groups of every regime."""
-    with SAMPLE.open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    found: dict[str, list[Group]] = {}
-    for regime in REGIMES:
-        keys: dict[tuple[object, ...], list[dict[str, str]]] = {}
-        for row in rows:
-            if row["regime"] == regime:
-                given = tuple(bool(row[name]) for name in INPUTS)
-                keys.setdefault((row["model"], row["sliding_mode"], given), []).append(row)
-        found[regime] = [Group(part) for part in keys.values()]
+    rows = pd.read_csv(SAMPLE, float_precision="round_trip")
+    found: dict[str, list[Group]] = {regime: [] for regime in REGIMES}
+    given = [rows[name].notna() for name in INPUTS]
+    for (regime, model, *_), part in rows.groupby([rows.regime, rows.model, rows.sliding_mode, *given], sort=False):
+        inputs = {name: part[name].to_numpy(float) for name in INPUTS}
+        found[regime].append(Group(regime, model, inputs, part.permanent_displacement.to_numpy(float)))
     return found

@@ -69,7 +69,7 @@ def measure(
     """A point from all groups of a regime, each repeated up to some cells and solved with the option `by`."""
     seconds, errors = 0.0, []
     for group in groups:
-        many = group.repeated(max(1, cells // group.size))
+        many = group.take(np.tile(np.arange(group.size), max(1, cells // group.size)))
         errors.append(group.errors(solve(many, by)[: group.size]))
         seconds += cpu_time(partial(solve, many, by), 0.05 if cells > 64 else 0.0) / many.size * group.size
     error = np.concatenate(errors)

@@ -5,6 +5,7 @@ import runpy
 import sys
 from pathlib import Path
 
+import matplotlib
 import pytest
 
 import slipsweep
@@ -27,35 +28,25 @@ WRITES = {
 SLOW = ("large_sweeps", "faults")
 
 
-@pytest.fixture(autouse=True)
-def _from_the_root(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(ROOT)
-
-
 @pytest.mark.filterwarnings("ignore")  # of the packages compared with
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name in WRITES],
-)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow if n in SLOW else ()) for n in WRITES])
 def test_runs_and_writes(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if name == "records":
         pytest.importorskip("pynewmarkdisp")  # of the extra `bench`
+    monkeypatch.chdir(ROOT)
     # before each time that is taken, which means nothing here: 0.2 s for all that tests have made
     monkeypatch.setattr(gc, "collect", lambda: 0)
     monkeypatch.setattr(sys, "argv", [name, "--tiny", "--folder", str(tmp_path)])
-    runpy.run_module(f"benchmarks.{name}", run_name="__main__")
+    with matplotlib.rc_context():  # some of the packages compared with set a font
+        runpy.run_module(f"benchmarks.{name}", run_name="__main__")
     for file in WRITES[name]:
         assert (tmp_path / file).stat().st_size > 0, file
 
 
 def test_other_waves_of_the_papers_peaks() -> None:
     """The tutorial quotes what a sweep gives of the stick-slip experiment."""
-    waves = [
-        slipsweep.Harmonics((1.0, 0.3), (1, 3), (0.0, 180.0), cycles=5),
-        slipsweep.Triangle(5),
-        slipsweep.Sine(5),
-        slipsweep.Square(5),
-    ]
+    harmonics = slipsweep.Harmonics((1.0, 0.3), (1, 3), (0.0, 180.0), cycles=5)
+    waves = [harmonics, slipsweep.Triangle(5), slipsweep.Sine(5), slipsweep.Square(5)]
     text = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8").split("## Other waves of the same peaks")[1]
     for wave in waves:
         found = slipsweep.sweep(

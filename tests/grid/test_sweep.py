@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,7 @@ import xarray as xr
 import slipsweep
 from slipsweep._version import __version__
 from slipsweep.errors import InputError
-from slipsweep.grid import engine, plans
-from slipsweep.grid.inputs import Inputs
+from slipsweep.grid import engine
 from slipsweep.model.variables import (
     DEFAULT_RESULTS,
     FRICTION_PARAMETERS,
@@ -33,6 +33,8 @@ AXES: dict[str, Any] = {
     "amplitude": [0.5, 2.0, 4.0, 8.0],
     "frequency": [0.5, 1.0, 2.0, 4.0, 8.0],
 }
+
+GOOD: dict[str, Any] = {"theta": 5.0, "mu_s": 0.38, "amplitude": 3.0, "frequency": 1.0}
 
 
 @pytest.fixture
@@ -107,10 +109,8 @@ def test_an_array_of_two_dimensions_keeps_them() -> None:
     result = slipsweep.sweep([0.0, 5.0], 0.38, 4.0, frequency)
     assert result.permanent_displacement.dims == ("theta", "site", "mode")
     assert result.frequency.dims == ("site", "mode")
-    expected = slipsweep.sweep([0.0, 5.0], 0.38, 4.0, frequency.values.ravel())
-    np.testing.assert_array_equal(
-        result.permanent_displacement.values.reshape(2, 6), expected.permanent_displacement.values
-    )
+    expected = slipsweep.sweep([0.0, 5.0], 0.38, 4.0, frequency.values.ravel()).permanent_displacement
+    np.testing.assert_array_equal(result.permanent_displacement, expected.values.reshape(2, 3, 2))
 
 
 def test_a_lazy_parameter_is_computed() -> None:
@@ -194,9 +194,7 @@ def test_nothing_unasked_is_computed(cells_solved: list[int]) -> None:
     result = slipsweep.sweep(**AXES, variables=FRICTION_PARAMETERS)
     assert tuple(result.data_vars) == tuple(name for name in RESULTS if name in FRICTION_PARAMETERS)
     assert not cells_solved
-    plan = plans.plan_sweep(Inputs(**AXES), variables=["sliding_mode"])
-    assert [task.request.wanted for task in plan.tasks] == [("sliding_mode",)]
-    assert plan.solve().data_vars.keys() == {"sliding_mode"}
+    assert slipsweep.sweep(**AXES, variables=["sliding_mode"]).data_vars.keys() == {"sliding_mode"}
 
 
 FURTHER_RESULT = """
@@ -211,21 +209,13 @@ def test_a_kernel_result_is_added_in_one_place(tmp_path: Path) -> None:
     """A field of `Motion`, named in model.variables, without an edit of a kernel or of the grid; as Python runs it."""
     package = tmp_path / "slipsweep"
     shutil.copytree(Path(slipsweep.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
-    for module, before, added in (
-        (
-            "kernels/block.py",
-            "    continuous_pulses: float\n",
-            "    continuous_pulses: float\n    lucky: float = 7.0\n",
-        ),
-        (
-            "model/variables.py",
-            '    "newmark_displacement": _cf(',
-            '    "lucky": _cf("1", "a number"),\n    "newmark_displacement": _cf(',
-        ),
+    for module, line, added in (
+        ("kernels/block.py", "    continuous_pulses: float\n", "    lucky: float = 7.0\n"),
+        ("model/variables.py", "\nRESULTS: dict[str, dict[str, Any]] = {\n", '    "lucky": _cf("1", "a number"),\n'),
     ):
         text = (package / module).read_text(encoding="utf-8")
-        assert text.count(before) == 1
-        (package / module).write_text(text.replace(before, added), encoding="utf-8")
+        assert text.count(line) == 1
+        (package / module).write_text(text.replace(line, line + added), encoding="utf-8")
     done = subprocess.run(
         [sys.executable, "-c", FURTHER_RESULT], capture_output=True, text=True, check=False,
         env={**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_DISABLE_JIT": "1"},
@@ -267,11 +257,17 @@ def test_a_lazy_sweep_computes_nothing(cells_solved: list[int]) -> None:
     assert 0 < sum(cells_solved) < 1e7
 
 
+def test_all_results_of_a_chunk_are_computed_once(cells_solved: list[int]) -> None:
+    lazy = slipsweep.sweep(**AXES, variables=DEFAULT_RESULTS, chunks={"theta": 1})
+    lazy.compute(scheduler="synchronous")
+    assert sum(cells_solved) == 3 * 2 * 4
+
+
 # ------------------------------------------------------------------------------ attributes
 
 
 def test_attributes_tell_how_it_was_made() -> None:
-    attrs = slipsweep.sweep(5.0, 0.38, 3.0, 1.0, excitation=slipsweep.Sine(cycles=3)).attrs
+    attrs = slipsweep.sweep(**GOOD, excitation=slipsweep.Sine(cycles=3)).attrs
     assert attrs["title"] == "Permanent displacement of a rigid block, swept"
     assert attrs["source"] == f"slipsweep {__version__}"
     assert "10.1016/j.soildyn.2011.08.007" in attrs["references"]
@@ -281,7 +277,7 @@ def test_attributes_tell_how_it_was_made() -> None:
         "solver": "cycle",
     }  # fmt: skip
     assert not {"rule", "steps_per_cycle"} & {*attrs}
-    stepped = slipsweep.sweep(5.0, 0.38, 3.0, 1.0, model="newmark", solver=slipsweep.Step(rule="simpson")).attrs
+    stepped = slipsweep.sweep(**GOOD, model="newmark", solver=slipsweep.Step(rule="simpson")).attrs
     assert (stepped["rule"], stepped["steps_per_cycle"]) == ("simpson", 1024)
     assert not {"rise", "recoupling"} & {*stepped}
     assert slipsweep.friction_parameters(5.0, 0.38, 3.0).attrs.keys() == {
@@ -290,9 +286,9 @@ def test_attributes_tell_how_it_was_made() -> None:
 
 
 def test_a_history_has_the_results_of_the_sweep() -> None:
-    history = slipsweep.simulate(5.0, 0.38, 3.55, 1.8, yield_acceleration=0.59, excitation=slipsweep.Sine(cycles=5))
+    block: dict[str, Any] = {**GOOD, "yield_acceleration": 0.59, "excitation": slipsweep.Sine(cycles=5)}
+    history, swept = slipsweep.simulate(**block), slipsweep.sweep(**block)
     assert history.relative_displacement.dims == ("time",)
-    swept = slipsweep.sweep(5.0, 0.38, 3.55, 1.8, yield_acceleration=0.59, excitation=slipsweep.Sine(cycles=5))
     xr.testing.assert_identical(
         history[list(DEFAULT_RESULTS)].drop_vars("time", errors="ignore"), swept.assign_attrs(history.attrs)
     )
@@ -300,8 +296,6 @@ def test_a_history_has_the_results_of_the_sweep() -> None:
 
 
 # ---------------------------------------------------------------------------------- errors
-
-GOOD: dict[str, Any] = {"theta": 5.0, "mu_s": 0.38, "amplitude": 3.0, "frequency": 1.0}
 
 BAD: list[tuple[dict[str, Any], str]] = [
     ({"theta": 90.0}, "theta = 90: must be 0 <= theta < 90 degrees"),
@@ -366,32 +360,28 @@ BAD: list[tuple[dict[str, Any], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("change", "message"), BAD, ids=[message[:40] for _, message in BAD])
-def test_bad_input_is_named(change: dict[str, Any], message: str) -> None:
-    with pytest.raises(InputError) as error:
-        slipsweep.sweep(**choices(**{**GOOD, **change}))
-    assert str(error.value).startswith(message)
-    assert "\n" not in str(error.value)
+BAD_HISTORIES: list[tuple[dict[str, Any], str]] = [
+    ({"theta": [1.0, 2.0]}, "theta: simulate takes one case; must be a single number"),
+    ({"mu_s": xr.DataArray([0.3], dims="case")}, "mu_s: simulate takes one case; must be a single number"),
+    ({"theta": 95.0}, "theta = 95: must be 0 <= theta < 90 degrees"),
+    ({"points_per_cycle": 3}, "points_per_cycle = 3: must be a whole number >= 4"),
+    ({"points_per_cycle": 10**9, "cycles": 10**9}, "a history of 1e+18 points: takes "),
+    ({"times": [0.0, 2.0, 1.0]}, "times: must be one row of finite, increasing numbers >= 0"),
+    ({"times": [-1.0]}, "times: must be one row of finite, increasing numbers >= 0"),
+    ({"times": [0.0, math.nan]}, "times: must be one row of finite, increasing numbers >= 0"),
+    ({"times": [[0.0, 1.0]]}, "times: must be one row of finite, increasing numbers >= 0"),
+]
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"theta": [1.0, 2.0]}, "theta: simulate takes one case; must be a single number"),
-        ({"mu_s": xr.DataArray([0.3], dims="case")}, "mu_s: simulate takes one case; must be a single number"),
-        ({"theta": 95.0}, "theta = 95: must be 0 <= theta < 90 degrees"),
-        ({"points_per_cycle": 3}, "points_per_cycle = 3: must be a whole number >= 4"),
-        ({"points_per_cycle": 10**9, "cycles": 10**9}, "a history of 1e+18 points: takes "),
-        ({"times": [0.0, 2.0, 1.0]}, "times: must be one row of finite, increasing numbers >= 0"),
-        ({"times": [-1.0]}, "times: must be one row of finite, increasing numbers >= 0"),
-        ({"times": [0.0, math.nan]}, "times: must be one row of finite, increasing numbers >= 0"),
-        ({"times": [[0.0, 1.0]]}, "times: must be one row of finite, increasing numbers >= 0"),
-    ],
+    ("call", "change", "message"),
+    [*((slipsweep.sweep, *bad) for bad in BAD), *((slipsweep.simulate, *bad) for bad in BAD_HISTORIES)],
 )
-def test_bad_histories_are_named(change: dict[str, Any], message: str) -> None:
+def test_bad_input_is_named(call: Callable[..., Any], change: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError) as error:
-        slipsweep.simulate(**choices(**{**GOOD, **change}))
+        call(**choices(**{**GOOD, **change}))
     assert str(error.value).startswith(message)
+    assert "\n" not in str(error.value)
 
 
 def test_bad_friction_parameters_are_named() -> None:
@@ -430,23 +420,6 @@ def test_units_of_arrays_are_converted() -> None:
     np.testing.assert_allclose(found.amplitude, [0.3 * 9.81, 0.5 * 9.81])
     with pytest.raises(InputError, match="amplitude"):
         slipsweep.sweep(5, 0.4, amplitude.assign_attrs(units="Hz"), 2.0)
-
-
-def test_all_results_of_a_chunk_are_computed_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    solve, calls = plans.Plan.solve, list[int]()
-
-    def counting(plan: plans.Plan, *given: Any) -> xr.Dataset:
-        calls.append(plan.cells)
-        return solve(plan, *given)
-
-    monkeypatch.setattr(plans.Plan, "solve", counting)
-    names = ["permanent_displacement", "peak_relative_velocity", "limiting_acceleration", "validity"]
-    whole = slipsweep.sweep(**AXES, variables=names)
-    calls.clear()
-    lazy = slipsweep.sweep(**AXES, variables=names, chunks={"theta": 1, "frequency": 2})
-    assert not calls
-    xr.testing.assert_identical(lazy.compute(scheduler="threads"), whole)
-    assert len(calls) == 9
 
 
 def test_unknown_arguments_are_errors() -> None:

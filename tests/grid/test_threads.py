@@ -1,6 +1,5 @@
 """Threads and processes: the policy of `slipsweep.grid.threads`, under everything that may call a sweep."""
 
-import functools
 import multiprocessing
 import os
 import signal
@@ -34,19 +33,11 @@ def expected() -> np.ndarray:
     return displacement()
 
 
-@functools.cache
-def count_in_process(**environment: str) -> int:
-    """Threads that a fresh process would use."""
+def count_in_process(code: str = "", **environment: str) -> int:
+    """Threads that a fresh process would use, after some code."""
     clean = {name: value for name, value in os.environ.items() if name not in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS")}
-    code = environment.pop("code", "")
-    done = subprocess.run(
-        [sys.executable, "-c", f"{code}\nfrom slipsweep.grid.threads import thread_count; print(thread_count())"],
-        env={**clean, **environment},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    return int(done.stdout)
+    code += "\nfrom slipsweep.grid.threads import thread_count; print(thread_count())"
+    return int(subprocess.check_output([sys.executable, "-c", code], env=clean | environment))
 
 
 # ------------------------------------------------------------------------------ how many
@@ -150,13 +141,9 @@ for sweep in ({", ".join(f"lambda: slipsweep.sweep({arguments})" for arguments i
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")
 @pytest.mark.parametrize("limit", ["", "1"], ids=["threads", "one"])
 def test_an_interrupt_is_heard_at_once(limit: str) -> None:
-    with subprocess.Popen(
-        [sys.executable, "-c", INTERRUPTED],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "OMP_NUM_THREADS": limit},
-    ) as process:
+    streams: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    environment = {**os.environ, "OMP_NUM_THREADS": limit}
+    with subprocess.Popen([sys.executable, "-c", INTERRUPTED], env=environment, **streams) as process:
         assert process.stdout is not None
         stop = threading.Timer(120, process.kill)
         stop.start()

@@ -12,7 +12,7 @@ import slipsweep
 from slipsweep.model.variables import VALUELESS, Validity
 from tests.support import reference, strategies
 from tests.support.cases import Case, choices, read_cases, solve
-from tests.support.hard_cells import CATEGORIES, Category, conditioning
+from tests.support.hard_cells import CATEGORIES, Category, conditioning, dtype_of
 
 CASES = [case for case in read_cases() if not case.uplift]
 WAVE_CASES = read_cases("waveforms")
@@ -58,12 +58,12 @@ def test_just_above_yield_keeps_its_digits() -> None:
 # ------------------------------------------------------------------------- hard cases (docs/hard-cases.md)
 
 
-@pytest.mark.parametrize("category", CATEGORIES, ids=lambda category: category.name)
+@pytest.mark.parametrize("category", CATEGORIES, ids=lambda category: category.__name__)
 def test_hard_cases_are_the_reference(category: Category) -> None:
     """The first and the last case of each category, solved again with their neighbours."""
-    own = [case for case in HARD_CASES if case.category == category.name]
+    own = [case for case in HARD_CASES if case.category == category.__name__]
     for case in (own[0], own[-1]):
-        found = conditioning(case.arguments, category.dtype)
+        found = conditioning(case.arguments, dtype_of(case.category))
         for name in ("permanent_displacement", "displacement_bound", "velocity_bound"):
             assert found[name] == getattr(case, name), f"{name} of case {case}"
 

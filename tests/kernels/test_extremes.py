@@ -199,22 +199,18 @@ def test_refusals_name_what_is_too_much(given: dict[str, Any], message: str, sol
 @pytest.mark.parametrize("rise", ["monotone", "literal"])
 @pytest.mark.parametrize("wave", [*WAVES, {"waveform": "triangle"}, {"waveform": "sine", "ramp_out": 1.0}], ids=str)
 def test_size_changes_nothing(wave: dict[str, Any], rise: str, recoupling: str) -> None:
-    """All accelerations and g 1e±25 times as large: so is u."""
-    block: dict[str, Any] = {"theta": 4.0, "mu_s": 0.6, "frequency": 1.0, "cycles": 4, "solver": "cycle"}
-    block |= {**wave, "rise": rise, "recoupling": recoupling}
-    accelerations = {"amplitude": 4.2, "yield_acceleration": 0.9, "g": 9.81}
-    usual = float(slipsweep.sweep(**choices(**block, **accelerations)).permanent_displacement)
-    assert usual > 0.0
+    """All accelerations and g 1e±25 times as large: so is u, under a wave and a record."""
+    shape = np.array([0.0, 4.2, -4.2, 4.2, 0.0])
+
+    def moved(size: float) -> list[float]:
+        block = {"theta": 4.0, "mu_s": 0.6, "rise": rise, "recoupling": recoupling}
+        block |= {"yield_acceleration": 0.9 * size, "g": 9.81 * size}
+        waved = {**wave, "amplitude": 4.2 * size, "frequency": 1.0, "cycles": 4, "solver": "cycle"}
+        recorded = {"excitation": slipsweep.Record(np.array([0.0, 0.25, 0.75, 1.25, 1.5]), shape * size)}
+        found = (slipsweep.sweep(**choices(**block, **motion)) for motion in (waved, recorded))
+        return [float(one.permanent_displacement) / size for one in found]
+
+    usual = moved(1.0)
+    assert usual[0] > 0.0
     for size in (1e-25, 1e25):
-        scaled = {name: value * size for name, value in accelerations.items()}
-        found = float(slipsweep.sweep(**choices(**block, **scaled)).permanent_displacement)
-        assert found / size == pytest.approx(usual, rel=1e-11), f"{size:g}"
-    record = slipsweep.Record(np.array([0.0, 0.25, 0.75, 1.25, 1.5]), np.array([0.0, 4.2, -4.2, 4.2, 0.0]))
-    recorded: dict[str, Any] = {"theta": 4.0, "mu_s": 0.6, "rise": rise, "recoupling": recoupling}
-    usual = float(
-        slipsweep.sweep(**choices(**recorded, yield_acceleration=0.9, excitation=record)).permanent_displacement
-    )
-    for size in (1e-25, 1e25):
-        large = slipsweep.Record(record.times, record.acceleration * size)
-        given = choices(**recorded, yield_acceleration=0.9 * size, g=9.81 * size, excitation=large)
-        assert float(slipsweep.sweep(**given).permanent_displacement) / size == pytest.approx(usual, rel=1e-11)
+        assert moved(size) == pytest.approx(usual, rel=1e-11), f"{size:g}"

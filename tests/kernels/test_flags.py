@@ -1,4 +1,4 @@
-"""Flags at their borders, of a record's pulses and of a cell without a value; others are in test_accuracy."""
+"""Flags at their borders; others are in test_properties, test_accuracy and, of records, in test_record."""
 
 import math
 from typing import Any
@@ -12,7 +12,6 @@ import slipsweep
 from slipsweep import Validity
 from slipsweep.model.variables import CAUTIONS, NOTES, VALUELESS
 from tests.support import strategies
-from tests.support.reference import solve_record
 
 
 @pytest.mark.parametrize("solver", ["cycle", "step"])
@@ -38,41 +37,6 @@ def test_near_the_mode_limit_begins_and_ends_at_the_number(
     np.testing.assert_array_equal(near, (ratio >= 0.9) & (ratio <= 1.1) & (found.sliding_mode.values > 0))
     assert near.any()
     assert not near.all()
-
-
-@st.composite
-def records(draw: st.DrawFn) -> np.ndarray:
-    samples = draw(st.lists(st.floats(-1.0, 1.0).map(lambda x: round(x, 3)), min_size=3, max_size=25))
-    return np.array([0.0, *samples, 0.0])
-
-
-@strategies.reproducible
-@given(
-    samples=records(),
-    theta=strategies.thetas,
-    mu_s=st.floats(0.15, 0.9),
-    strength=st.floats(0.3, 1.6),
-    share=st.none() | st.floats(0.05, 1.0),
-    friction=st.fixed_dictionaries({}, optional={"decay_rate": st.floats(0, 8), "delta_mu": st.floats(0, 0.4)}),
-)
-def test_a_record_has_the_flags_of_its_pulses(
-    samples: np.ndarray, theta: float, mu_s: float, strength: float, share: float | None, friction: dict[str, float]
-) -> None:
-    onset = strategies.coulomb_yield(theta, mu_s)
-    assume(onset > 0.05 and samples.any())
-    limit = strategies.limiting_acceleration(theta, mu_s, onset)
-    shaking = np.array((samples * strength * limit).tolist())
-    record = slipsweep.Record(np.array([0.05 * k for k in range(samples.size)]), shaking)
-    own: dict[str, Any] = dict(friction) if share is None else friction | {"yield_acceleration": onset * share}
-    found = slipsweep.sweep(theta, mu_s, excitation=record, **own)
-    raised = int(found.validity)
-    if raised & VALUELESS:
-        assert not raised & (Validity.UPSLOPE | Validity.NEAR_MODE_LIMIT | Validity.FRICTION_ESTIMATED)
-        return
-    expected = solve_record(record.times, shaking, theta, mu_s, **own).validity
-    assert Validity(raised) == Validity(expected)
-    newmark = slipsweep.sweep(theta, mu_s, excitation=record, model="newmark")
-    assert int(newmark.validity) == 0
 
 
 def test_flags_of_a_value_need_one_and_friction_parameters_have_those_before_the_motion() -> None:

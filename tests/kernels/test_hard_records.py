@@ -22,10 +22,10 @@ def solved(cell: Cell) -> tuple[float, float, int]:
     return found[names[0]].item(), found[names[1]].item(), found[names[2]].item()
 
 
-@pytest.mark.parametrize("category", CATEGORIES, ids=lambda category: category.name)
+@pytest.mark.parametrize("category", CATEGORIES, ids=lambda category: category.__name__)
 def test_newmark_within_100_times_the_conditioning(category: Category) -> None:
     wrong = []
-    for number, cell in enumerate(category.cells()):
+    for number, cell in enumerate(category()):
         exact, *bounds = conditioning(cell)
         with workdps(60):
             own = (exact.permanent_displacement, exact.peak_relative_velocity)

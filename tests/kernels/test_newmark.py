@@ -9,39 +9,17 @@ import pytest
 import xarray as xr
 
 import slipsweep
+from tests.support import closed_forms
 from tests.support.cases import choices
 
 G = 9.81
 
-NEWMARK_BLOCKS = pytest.mark.parametrize(
-    ("theta", "mu_s", "amplitude", "frequency", "cycles"),
-    [
-        (10.0, 0.4, 4.0, 1.0, 3),
-        (0.0, 0.3, 5.0, 2.0, 3),
-        (5.0, 0.5, 5.0, 1.0, 2),
-    ],
-)
-
-
-def newmark_displacement(ratio: Any) -> Any:
-    """W/A of a cycle of Newmark's block with Üy/A = `ratio` under a sine."""
-    if ratio == 0:
-        return 2 * mpmath.pi
-    onset = mpmath.asin(ratio)
-
-    def velocity(phi: Any) -> Any:
-        return mpmath.cos(onset) - mpmath.cos(phi) - ratio * (phi - onset)
-
-    # from the second Üg = Üy on V falls; counted from the peak of Üg that comes at −1, and the stop at 2 to 3
-    half = mpmath.acos(ratio)
-    bracket = (mpmath.pi / 2 + half, mpmath.pi / 2 + 3 * half)
-    stop = mpmath.findroot(velocity, bracket, solver="anderson", maxsteps=200, verify=False)
-    slid = stop - onset
-    return mpmath.cos(onset) * slid - (mpmath.sin(stop) - ratio) - ratio * slid**2 / 2
-
 
 @pytest.mark.filterwarnings("ignore")  # pySLAMMER's own, on import
-@NEWMARK_BLOCKS
+@pytest.mark.parametrize(
+    ("theta", "mu_s", "amplitude", "frequency", "cycles"),
+    [(10.0, 0.4, 4.0, 1.0, 3), (0.0, 0.3, 5.0, 2.0, 3), (5.0, 0.5, 5.0, 1.0, 2)],
+)
 def test_newmark_against_pyslammer(theta: float, mu_s: float, amplitude: float, frequency: float, cycles: int) -> None:
     """pySLAMMER takes the trapezoidal rule from sample to sample, onset and stop at the samples: second order.
 
@@ -69,26 +47,16 @@ def test_newmark_to_the_last_digits() -> None:
     ratio = np.concatenate([random.uniform(0.0, 1.0, 150), near, 1.0 - near, [1e-300, 1e-17, np.nextafter(1.0, 0.0)]])
     onset = amplitude * ratio
     onset = onset[(onset > 0.0) & (onset < amplitude)]
+    excitation = slipsweep.Sine(cycles=cycles)
     result = slipsweep.sweep(
-        5.0,
-        0.38,
-        amplitude,
-        1.0,
-        yield_acceleration=onset,
-        model="newmark",
-        excitation=slipsweep.Sine(cycles=cycles),
+        5.0, 0.38, amplitude, 1.0, yield_acceleration=onset, model="newmark", excitation=excitation
     )
+    found = (onset, result.permanent_displacement.values, result.peak_relative_velocity.values)
     with mpmath.workdps(80):
-        omega = 2 * mpmath.pi
-        for value, displacement, velocity in zip(
-            onset.tolist(),
-            result.permanent_displacement.values.tolist(),
-            result.peak_relative_velocity.values.tolist(),
-            strict=True,
-        ):
+        for value, displacement, velocity in zip(*map(np.ndarray.tolist, found), strict=True):
             share = mpmath.mpf(value) / mpmath.mpf(amplitude)
-            slid = cycles * amplitude * newmark_displacement(share) / omega**2
-            fastest = 2 * amplitude * (mpmath.sqrt(1 - share**2) - share * mpmath.acos(share)) / omega
+            slid = cycles * amplitude * closed_forms.sine(share)
+            fastest = amplitude * (mpmath.sqrt(1 - share**2) - share * mpmath.acos(share)) / mpmath.pi
             assert abs(displacement / slid - 1) < 1.5e-15, f"displacement at {float(share)}"
             assert abs(velocity / fastest - 1) < 1.5e-15, f"peak velocity at {float(share)}"
 
@@ -112,13 +80,10 @@ def test_mendez_reduces_to_newmark_just_above_yield(solver: str, recoupling: str
 
 def test_mendez_held_at_yield_is_newmark() -> None:
     """Where Eq. 4 stays below yield and recoupling is integrated, the two models are one block."""
-    theta = np.linspace(0.0, 25.0, 6)
-    mu_s = np.linspace(0.5, 0.8, 4)
-    amplitude = np.linspace(0.5, 12.0, 24)
-    mendez = slipsweep.sweep(
-        theta, mu_s, amplitude, 2.0, model=slipsweep.Mendez(recoupling="integrate"), excitation=slipsweep.Sine(cycles=4)
-    )
-    newmark = slipsweep.sweep(theta, mu_s, amplitude, 2.0, model="newmark", excitation=slipsweep.Sine(cycles=4))
+    axes: dict[str, Any] = {"theta": np.linspace(0.0, 25.0, 6), "mu_s": np.linspace(0.5, 0.8, 4), "frequency": 2.0}
+    axes |= {"amplitude": np.linspace(0.5, 12.0, 24), "excitation": slipsweep.Sine(cycles=4)}
+    mendez = slipsweep.sweep(**axes, model=slipsweep.Mendez(recoupling="integrate"))
+    newmark = slipsweep.sweep(**axes, model="newmark")
     held = (mendez.validity & 16 > 0).to_numpy()
     assert held.sum() > 20, "cells held at yield"
     for name in ("permanent_displacement", "peak_relative_velocity"):

@@ -80,8 +80,8 @@ def test_cycles_passed_over_are_those_gone_through(monkeypatch: pytest.MonkeyPat
 
 @pytest.mark.parametrize("waveform", ["sine", "cosine", "triangle", "square", "harmonics"])
 def test_waveforms_csv_is_the_reference(waveform: str) -> None:
-    """Some cases of each waveform, solved again."""
-    for case in [case for case in read_cases("waveforms") if case.waveform == waveform][::12]:
+    """Some cases of each waveform, solved again; one with a fiftieth harmonic."""
+    for case in [case for case in read_cases("waveforms") if case.waveform == waveform][1::12]:
         found = reference.solve(**case.arguments, dps=20)
         assert (found.sliding_mode, found.validity) == (case.sliding_mode, case.validity), f"case {case}"
         numbers = (float(found.permanent_displacement), float(found.peak_relative_velocity), 0, 0)

@@ -33,6 +33,7 @@ SOLVERS: list[dict[str, Any]] = [
 
 def assert_no_value(found: xr.Dataset, flag: Validity) -> None:
     assert int(found.validity) & flag
+    assert not int(found.validity) & (Validity.UPSLOPE | Validity.NEAR_MODE_LIMIT | Validity.FRICTION_ESTIMATED)
     assert np.isnan(found.permanent_displacement), "displacement"
     assert np.isnan(found.peak_relative_velocity), "velocity"
 

@@ -70,9 +70,10 @@ MOTION = ("permanent_displacement", "peak_relative_velocity")
 
 @dataclass(frozen=True)
 class Group:
-    """Cells of one sweep: its options and the columns of its cells; of those in `histories` a history is taken.
+    """Cells of one sweep: its options, the columns of its cells, and why each is drawn.
 
-    `fastest` is the multiple of the fastest harmonic; steps and histories resolve that.
+    `fastest` is the multiple of the fastest harmonic; steps and histories resolve that.  Of the cell `one` a history
+    is taken and the reference asked.
     """
 
     options: dict[str, Any]
@@ -81,8 +82,19 @@ class Group:
     cells: dict[str, Array]
     fastest: int
     regimes: tuple[str, ...]
-    histories: tuple[int, ...]
+    one: int
     seed: int
+
+    def cell(self, j: int) -> dict[str, Any]:
+        """The inputs of a cell."""
+        return {name: float(values[j]) for name, values in self.cells.items()}
+
+    def amplitude(self, j: int) -> float:
+        """The plane's peak acceleration of a cell."""
+        cell = self.cell(j)
+        if "amplitude" in cell:
+            return float(cell["amplitude"])
+        return float(cell["displacement_amplitude"] * (2.0 * math.pi * cell["frequency"]) ** 2)
 
 
 @dataclass(frozen=True)
@@ -190,7 +202,7 @@ def group_of(seed: int, size: int = 32) -> Group:
         columns,
         fastest,
         tuple(regime for regime, _ in drawn),
-        (rng.randrange(size),),
+        rng.randrange(size),
         seed,
     )
 
@@ -207,64 +219,26 @@ def _sweep(cells: dict[str, Array], options: dict[str, Any]) -> Found:
     return {str(name): found[name].to_numpy() for name in found.data_vars}
 
 
-def _moved(cells: dict[str, Array], size: float, seed: int) -> dict[str, Array]:
-    """Every cell with all its inputs moved up or down by `size`, `MOVES` times."""
-    generator = np.random.default_rng(seed)
+def exact_of(group: Group, size: float) -> Found:
+    """What the cycle solver says of the cells, row 0, and of each with all its inputs moved up or down by `size`."""
+    generator = np.random.default_rng(group.seed % 2**32)
     # any two of the inputs, of which there are eight at most, move in the same direction in half of the moves
     together = iter(hadamard(MOVES))
-    moved = {}
-    for name, values in cells.items():
-        if name == "frequency":
-            moved[name] = values
-            continue
-        signs = next(together)[:, np.newaxis] * generator.choice([-1.0, 1.0], values.size)
-        moved[name] = values * (1.0 + size * signs)
-    return moved
+    moved = dict(group.cells)
+    for name, values in group.cells.items():
+        if name != "frequency":
+            signs = next(together)[:, np.newaxis] * generator.choice([-1.0, 1.0], values.size)
+            moved[name] = values * (1.0 + size * np.vstack([np.zeros(values.size), signs]))
+    return _sweep(moved, group.options | {"solver": "cycle"})
 
 
-def _outcome(found: dict[str, Any]) -> tuple[int, int]:
+def _outcome(mode: Any, validity: Any) -> tuple[int, int]:
     """Mode and validity, but for `UPSLOPE`: the sign of a displacement, which may be 0 but for roundings."""
-    return int(found["sliding_mode"]), int(found["validity"]) & ~int(Validity.UPSLOPE)
-
-
-@dataclass(frozen=True)
-class Exact:
-    """What the cycle solver says of the cells, and of their neighbours."""
-
-    cells: Found
-    neighbours: Found
-
-    def of(self, j: int) -> dict[str, Any]:
-        return {name: values[j] for name, values in self.cells.items()}
-
-    def outcomes(self, j: int) -> set[tuple[int, int]]:
-        """Mode and validity of a cell and of its neighbours."""
-        pairs = zip(self.neighbours["sliding_mode"][:, j], self.neighbours["validity"][:, j], strict=True)
-        return {_outcome(self.of(j))} | {_outcome({"sliding_mode": mode, "validity": flags}) for mode, flags in pairs}
-
-    def spread(self, name: str, j: int) -> float:
-        """How far a result of the neighbours is from the cell's; those without a value do not count."""
-        apart = np.abs(self.neighbours[name][:, j] - self.cells[name][j])
-        return float(np.nanmax(np.where(np.isnan(apart), 0.0, apart)))
-
-
-def _amplitude(group: Group, j: int) -> float:
-    """The plane's peak acceleration of a cell."""
-    if "amplitude" in group.cells:
-        return float(group.cells["amplitude"][j])
-    return float(group.cells["displacement_amplitude"][j] * (2.0 * math.pi * group.cells["frequency"][j]) ** 2)
-
-
-def _text(group: Group, j: int, **solver: Any) -> str:
-    """The call that repeats a cell, in the words of `cases.choices`."""
-    arguments = {name: float(values[j]) for name, values in group.cells.items()} | group.options | solver
-    return f"seed {group.seed}, {group.regimes[j]}: " + ", ".join(
-        f"{key}={value!r}" for key, value in arguments.items()
-    )
+    return int(mode), int(validity) & ~int(Validity.UPSLOPE)
 
 
 def _judged(
-    kind: str, group: Group, exact: Exact, j: int, found: dict[str, Any], coarse: dict[str, float] | None = None,
+    kind: str, group: Group, exact: Found, j: int, found: dict[str, Any], coarse: dict[str, float] | None = None,
     **solver: Any,
 ) -> Comparison:  # fmt: skip
     """A cell's results found in another way against the cycle solver's.
@@ -273,11 +247,14 @@ def _judged(
     to over the shaking, or a thousandth of what the plane does, if that is more.  To the bound comes how far the
     neighbours are.
     """
-    own = exact.of(j)
+    own = {name: values[0, j] for name, values in exact.items()}
     mode = int(own["sliding_mode"])
-    text = _text(group, j, **solver)
-    outcome = _outcome(found)
-    if outcome not in exact.outcomes(j):
+    arguments = group.cell(j) | group.options | solver
+    # the call that repeats a cell, in the words of `cases.choices`
+    text = ", ".join(f"{key}={value!r}" for key, value in arguments.items())
+    text = f"seed {group.seed}, {group.regimes[j]}: {text}"
+    outcome = _outcome(found["sliding_mode"], found["validity"])
+    if outcome not in map(_outcome, exact["sliding_mode"][:, j], exact["validity"][:, j]):
         return Comparison(kind, group.regimes[j], mode, math.inf, math.inf, f"{text}: mode and validity {outcome}")
     valued = not outcome[1] & VALUELESS
     if valued != all(math.isfinite(found[name]) for name in MOTION):
@@ -287,7 +264,7 @@ def _judged(
     difference, times = 0.0, 0.0
     u, v = (abs(float(own[name])) for name in MOTION)
     period, cycles = 1.0 / float(group.cells["frequency"][j]), group.options["cycles"]
-    pushed = _amplitude(group, j) * period
+    pushed = group.amplitude(j) * period
     nothing = (1e-22 * pushed * period, 1e-22 * pushed)
     scales = max(u, nothing[0]), max(v, nothing[1])
     if mode == CONTINUOUS:
@@ -297,7 +274,8 @@ def _judged(
         apart = abs(float(found[name]) - own[name])
         if apart == 0.0:
             continue
-        moved = exact.spread(name, j) + least
+        # those that have a value
+        moved = float(np.nanmax(np.abs(exact[name][:, j] - own[name]))) + least
         bound = FLOORS[kind] * scale + moved
         if coarse is not None:  # finer steps are nearer, unless the coarse ones are near already
             bound = min(bound, 0.5 * coarse[name] + 1e-3 * FLOORS[kind] * scale + moved)
@@ -307,7 +285,7 @@ def _judged(
     return Comparison(kind, group.regimes[j], mode, difference, times, text)
 
 
-def _stepped(group: Group, exact: Exact) -> Iterator[Comparison]:
+def _stepped(group: Group, exact: Found) -> Iterator[Comparison]:
     """The step solver: codes, values, and that finer steps come nearer."""
     options = group.options | {"solver": "step", "rule": group.rule}
     # a lucky count of steps makes no error small
@@ -315,19 +293,19 @@ def _stepped(group: Group, exact: Exact) -> Iterator[Comparison]:
     fine = group.steps * FINER[group.rule]
     found = _sweep(group.cells, options | {"steps_per_cycle": fine})
     for j in range(len(group.regimes)):
-        coarse = {name: max(abs(run[name][j] - exact.cells[name][j]) for run in runs) for name in MOTION}
+        coarse = {name: max(abs(run[name][j] - exact[name][0, j]) for run in runs) for name in MOTION}
         own = {name: values[j] for name, values in found.items()}
         yield _judged(
             f"step, {group.rule}", group, exact, j, own, coarse, solver="step", rule=group.rule, steps_per_cycle=fine
         )
 
 
-def _histories(group: Group, exact: Exact) -> Iterator[Comparison]:
+def _histories(group: Group, exact: Found) -> Iterator[Comparison]:
     """`simulate`: its end, and the largest velocity of the samples; of cells that slide on into the next pulse, too."""
     cycles = group.options["cycles"]
-    carried = [j for j in range(len(group.regimes)) if exact.of(j)["validity"] & Validity.NOT_RECOUPLED]
-    for j in {*group.histories, *carried[:2]}:
-        arguments = choices(**{name: float(values[j]) for name, values in group.cells.items()}, **group.options)
+    carried = [j for j in range(len(group.regimes)) if exact["validity"][0, j] & Validity.NOT_RECOUPLED]
+    for j in {group.one, *carried[:2]}:
+        arguments = choices(**group.cell(j), **group.options)
         shaken, spacing = cycles / arguments["frequency"], 1.0 / arguments["frequency"] / (256 * group.fastest)
         # the largest V comes early, late or again and again; the run-out is over long before the last of the times
         times = np.arange(min(cycles, 20) * 256 * group.fastest + 1) * spacing
@@ -335,7 +313,7 @@ def _histories(group: Group, exact: Exact) -> Iterator[Comparison]:
         history = slipsweep.simulate(**arguments, times=np.append(times, 1e12 * shaken))
         found = {name: history[name].item() for name in ("sliding_mode", "validity")}
         found[MOTION[0]] = history.relative_displacement.to_numpy()[-1]
-        highest, own = history.relative_velocity.to_numpy().max(), exact.of(j)[MOTION[1]]
+        highest, own = history.relative_velocity.to_numpy().max(), exact[MOTION[1]][0, j]
         # between two samples V may be larger than at either; of a slip that lies between them no sample knows
         ground = history.ground_acceleration.to_numpy()
         relative = np.abs(ground - history.block_acceleration.to_numpy())
@@ -344,14 +322,13 @@ def _histories(group: Group, exact: Exact) -> Iterator[Comparison]:
         yield _judged("simulate", group, exact, j, found)
 
 
-def _by_reference(group: Group, exact: Exact) -> Iterator[Comparison]:
+def _by_reference(group: Group, exact: Found) -> Iterator[Comparison]:
     """The multiple-precision reference on a cell that takes it no minutes."""
     if group.fastest > 8 or group.options["cycles"] > 40 or group.options.get("ramp_in", 0.0) > 2.0:
         return
-    for j in group.histories:
-        cell = {name: float(values[j]) for name, values in group.cells.items() if name != "displacement_amplitude"}
-        arguments = cell | {"amplitude": _amplitude(group, j)} | group.options
-        yield _judged("reference", group, exact, j, vars(reference.solve(**arguments, dps=15)))
+    cell = group.cell(group.one) | {"amplitude": group.amplitude(group.one)} | group.options
+    cell.pop("displacement_amplitude", None)
+    yield _judged("reference", group, exact, group.one, vars(reference.solve(**cell, dps=15)))
 
 
 def compare(group: Group) -> Iterator[Comparison]:
@@ -360,10 +337,3 @@ def compare(group: Group) -> Iterator[Comparison]:
     yield from _stepped(group, exact_of(group, SIZES[f"step, {group.rule}"]))
     yield from _histories(group, near)
     yield from _by_reference(group, near)
-
-
-def exact_of(group: Group, move: float) -> Exact:
-    """What the cycle solver says of a group, and of its cells moved."""
-    options = group.options | {"solver": "cycle"}
-    moved = _moved(group.cells, move, group.seed % 2**32)
-    return Exact(_sweep(group.cells, options), _sweep(moved, options))

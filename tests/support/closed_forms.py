@@ -27,7 +27,10 @@ def sine(r: mpf) -> mpf:
     def velocity(phase: mpf) -> mpf:
         return mp.cos(first) - mp.cos(phase) - r * (phase - first)
 
-    last = mp.findroot(velocity, (mp.pi - first, 2 * mp.pi), solver="anderson")
+    # from the peak on by π/2 − φ₁ to that w = r, and by two to three times as much to the root
+    quarter = mp.acos(r)
+    bracket = (mp.pi / 2 + quarter, mp.pi / 2 + 3 * quarter)
+    last = mp.findroot(velocity, bracket, solver="anderson", maxsteps=200, verify=False)
     slides = (mp.cos(first) + r * first) * (last - first) - (mp.sin(last) - mp.sin(first))
     return (slides - r * (last**2 - first**2) / 2) / (4 * mp.pi**2)
 

@@ -5,9 +5,8 @@ their neighbours one ulp away, in multiple precision into data/hard_cases.csv.
 """
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, TypeAlias
 
 import numpy as np
 from mpmath import mp, mpf, nstr, workdps
@@ -24,15 +23,8 @@ Cell = dict[str, Any]
 PLANES = ((5.0, 0.38), (0.0, 0.5), (18.0, 0.4))
 
 
-@dataclass(frozen=True)
-class Category:
-    """Cells that are hard for one reason."""
-
-    name: str
-    danger: str
-    cells: Callable[[], Iterator[Cell]]
-    #: Type in which the results are kept.
-    dtype: str = "float64"
+#: Cells that are hard for one reason, which is the docstring.
+Category: TypeAlias = Callable[[], Iterator[Cell]]
 
 
 def _cell(theta: float, mu_s: float, amplitude: float, **options: Any) -> Cell:
@@ -50,7 +42,8 @@ def _ulps(value: float, count: int) -> float:
     return value
 
 
-def _just_above_yield() -> Iterator[Cell]:
+def just_above_yield() -> Iterator[Cell]:
+    """u goes with (A − Üy)²: differences of nearly equal numbers lose all digits; the slide is shorter than a step."""
     for theta, mu_s in PLANES:
         onset = _friction(theta, mu_s).yield_acceleration
         for k in (2, 5, 8, 11, 14):
@@ -62,14 +55,16 @@ def _just_above_yield() -> Iterator[Cell]:
     yield _cell(5.0, 0.38, _ulps(0.59, 1), yield_acceleration=0.59, model="newmark")
 
 
-def _mode_limit() -> Iterator[Cell]:
+def mode_limit() -> Iterator[Cell]:
+    """A within rounding of Üg,lim: the mode, and with it the answer, may jump."""
     for theta, mu_s in PLANES:
         limit = float(_friction(theta, mu_s).limiting_acceleration)
         for amplitude in (limit * (1 - 1e-9), _ulps(limit, -1), limit, _ulps(limit, 1), limit * (1 + 1e-9)):
             yield _cell(theta, mu_s, amplitude)
 
 
-def _near_failure() -> Iterator[Cell]:
+def near_failure() -> Iterator[Cell]:
+    """μs within 10⁻ᵏ of tan θ: Üy is all cancellation, Kd small."""
     for theta in (5.0, 18.0):
         with workdps(40):
             tangent = mp.tan(mp.radians(mpf(theta)))
@@ -81,7 +76,8 @@ def _near_failure() -> Iterator[Cell]:
         yield _cell(theta, float(tangent * (1 + mpf(10) ** -9)), 1.0, cycles=2, model="newmark")
 
 
-def _level_plane() -> Iterator[Cell]:
+def level_plane() -> Iterator[Cell]:
+    """θ = 0 or nearly: division by tan θ; the drift of a cycle must vanish."""
     for amplitude in (5.5, 9.0, 11.0, 14.0):
         for cycles in (1, 1000):
             yield _cell(0.0, 0.5, amplitude, cycles=cycles)
@@ -91,7 +87,8 @@ def _level_plane() -> Iterator[Cell]:
         yield _cell(theta, 0.5, 11.0, cycles=1000)
 
 
-def _uplift() -> Iterator[Cell]:
+def uplift() -> Iterator[Cell]:
+    """A tan θ → g: the normal force vanishes in the cycle."""
     for theta, mu_s in ((20.0, 0.6), (30.0, 0.9)):
         with workdps(40):
             uplift = mpf(G) / mp.tan(mp.radians(mpf(theta)))
@@ -99,7 +96,8 @@ def _uplift() -> Iterator[Cell]:
             yield _cell(theta, mu_s, uplift * (1 - mpf(10) ** -k), cycles=2)
 
 
-def _limit_undefined() -> Iterator[Cell]:
+def limit_undefined() -> Iterator[Cell]:
+    """1 − tan θ (μs − tan θ) → 0: Üg,lim and Δμ grow without bound."""
     for theta in (45.0, 60.0):
         with workdps(40):
             tangent = mp.tan(mp.radians(mpf(theta)))
@@ -112,7 +110,8 @@ def _limit_undefined() -> Iterator[Cell]:
             yield _cell(theta, mu_s, 0.9 * uplift, yield_acceleration=0.3 * uplift, cycles=2)
 
 
-def _friction_not_decaying() -> Iterator[Cell]:
+def friction_not_decaying() -> Iterator[Cell]:
+    """μs ξ² → 1: λ is the logarithm of nearly 1, or there is none."""
     for theta, mu_s in ((5.0, 1.2), (0.0, 1.5)):
         limit = _friction(theta, mu_s).limiting_acceleration
         for k in (2, 5, 8, 11, 14):
@@ -134,7 +133,8 @@ def _friction_not_decaying() -> Iterator[Cell]:
             yield _cell(0.0, 1.5, amplitude, cycles=2, yield_acceleration=2.0, delta_mu=0.0)
 
 
-def _sharp_decay() -> Iterator[Cell]:
+def sharp_decay() -> Iterator[Cell]:
+    """λA/g up to 10⁶: friction gone in a layer of 10⁻⁶ of phase."""
     for k in (2, 3, 4, 5, 6):
         for amplitude, onset in ((3.0, 0.59), (5.1, 0.08), (5.1, 1e-5)):
             friction = {"yield_acceleration": onset, "decay_rate": 10.0**k * G / amplitude, "delta_mu": 0.1}
@@ -144,7 +144,8 @@ def _sharp_decay() -> Iterator[Cell]:
     yield _cell(5.0, 0.38, 3.0, rise="literal", **friction)
 
 
-def _tangential_onset() -> Iterator[Cell]:
+def tangential_onset() -> Iterator[Cell]:
+    """Eq. 4 touches Üg: a double root, or none; the slide shrinks to a point."""
     # D(x) = x − Eq. 4 vanishes where μs + Δμ = F(x) = e^(λx/g) (μs − tan θ + g tan θ / n).  On a plane
     # steeper than friction holds, F has a maximum: there Eq. 4 touches Üg from above.
     theta, mu_s, onset, amplitude = 20.0, 0.2, 1.3 * G, 1.4 * G
@@ -169,7 +170,8 @@ def _tangential_onset() -> Iterator[Cell]:
             yield _cell(theta, mu_s, amplitude, yield_acceleration=0.59, **friction)
 
 
-def _restick() -> Iterator[Cell]:
+def restick() -> Iterator[Cell]:
+    """the block stops before the peak, and may start again."""
     for case in read_cases():
         if case.category == "restick":
             cell = case.arguments
@@ -179,7 +181,8 @@ def _restick() -> Iterator[Cell]:
                 yield {**cell, "rise": "literal"}
 
 
-def _stop_at_next_onset() -> Iterator[Cell]:
+def stop_at_next_onset() -> Iterator[Cell]:
+    """V reaches 0 just as the next slide begins."""
     for theta, mu_s, model in ((18.0, 0.34, "mendez"), (5.0, 0.12, "mendez"), (10.0, 0.2, "mendez")):
         onset = float(_friction(theta, mu_s).yield_acceleration)
         low, high = onset, float(_friction(theta, mu_s).limiting_acceleration)
@@ -193,7 +196,8 @@ def _stop_at_next_onset() -> Iterator[Cell]:
             yield _cell(theta, mu_s, amplitude, cycles=3, model=model)
 
 
-def _vanishing_kd() -> Iterator[Cell]:
+def vanishing_kd() -> Iterator[Cell]:
+    """Kd → 0 under the literal rise: u = v²/(2b) grows without bound."""
     theta, mu_s, amplitude, rate = 5.0, 0.38, 1.5, 4.0
     with workdps(60):
         tangent, g = mp.tan(mp.radians(mpf(theta))), mpf(G)
@@ -204,7 +208,8 @@ def _vanishing_kd() -> Iterator[Cell]:
             yield _cell(theta, mu_s, amplitude, yield_acceleration=0.59, rise="literal", **given)
 
 
-def _many_cycles() -> Iterator[Cell]:
+def many_cycles() -> Iterator[Cell]:
+    """10⁶ cycles: rounding adds up, or a loop takes for ever."""
     for theta, mu_s, amplitude in ((5.0, 0.38, 3.55), (6.0, 0.38, 5.1), (0.0, 0.5, 11.0), (18.0, 0.34, 2.0)):
         for model in ("mendez", "newmark"):
             yield _cell(theta, mu_s, amplitude, cycles=10**6, model=model)
@@ -212,13 +217,15 @@ def _many_cycles() -> Iterator[Cell]:
     yield _cell(1e-7, 0.5, 11.0, cycles=10**6)
 
 
-def _frequencies() -> Iterator[Cell]:
+def frequencies() -> Iterator[Cell]:
+    """f from 10⁻⁶ to 10⁶ Hz: 1/ω² over 24 decades."""
     for theta, mu_s, amplitude in ((5.0, 0.38, 3.55), (6.0, 0.38, 7.0), (0.0, 0.5, 11.0)):
         for frequency in (1e-6, 1e-3, 1e3, 1e6):
             yield {**_cell(theta, mu_s, amplitude, cycles=3), "frequency": frequency}
 
 
-def _magnitudes() -> Iterator[Cell]:
+def magnitudes() -> Iterator[Cell]:
+    """subnormal accelerations."""
     for amplitude in (2e-323, 1e-200, 1e-100):
         yield _cell(5.0, 0.38, amplitude, yield_acceleration=0.5 * amplitude, model="newmark")
     for amplitude in (1e-200, 1e-100):
@@ -226,40 +233,37 @@ def _magnitudes() -> Iterator[Cell]:
         yield _cell(5.0, 0.38, amplitude, **friction)
 
 
-def _float32() -> Iterator[Cell]:
+def float32() -> Iterator[Cell]:
+    """results kept in single precision: subnormal there."""
     for frequency in (1e-6, 1.0, 1e6):
         yield {**_cell(5.0, 0.38, 3.55), "frequency": frequency}
     for amplitude in (1e-43, 1e-38):  # u is about as large: subnormal, the least normal
         yield _cell(5.0, 0.38, amplitude, yield_acceleration=0.5 * amplitude, model="newmark")
 
 
-CATEGORIES = (
-    Category(
-        "just_above_yield",
-        "u goes with (A − Üy)²: differences of nearly equal numbers lose all digits; the slide is shorter than a step",
-        _just_above_yield,
-    ),
-    Category("mode_limit", "A within rounding of Üg,lim: the mode, and with it the answer, may jump", _mode_limit),
-    Category("near_failure", "μs within 10⁻ᵏ of tan θ: Üy is all cancellation, Kd small", _near_failure),
-    Category("level_plane", "θ = 0 or nearly: division by tan θ; the drift of a cycle must vanish", _level_plane),
-    Category("uplift", "A tan θ → g: the normal force vanishes in the cycle", _uplift),
-    Category("limit_undefined", "1 − tan θ (μs − tan θ) → 0: Üg,lim and Δμ grow without bound", _limit_undefined),
-    Category(
-        "friction_not_decaying", "μs ξ² → 1: λ is the logarithm of nearly 1, or there is none", _friction_not_decaying
-    ),
-    Category("sharp_decay", "λA/g up to 10⁶: friction gone in a layer of 10⁻⁶ of phase", _sharp_decay),
-    Category(
-        "tangential_onset", "Eq. 4 touches Üg: a double root, or none; the slide shrinks to a point", _tangential_onset
-    ),
-    Category("restick", "the block stops before the peak, and may start again", _restick),
-    Category("stop_at_next_onset", "V reaches 0 just as the next slide begins", _stop_at_next_onset),
-    Category("vanishing_kd", "Kd → 0 under the literal rise: u = v²/(2b) grows without bound", _vanishing_kd),
-    Category("many_cycles", "10⁶ cycles: rounding adds up, or a loop takes for ever", _many_cycles),
-    Category("frequencies", "f from 10⁻⁶ to 10⁶ Hz: 1/ω² over 24 decades", _frequencies),
-    Category("magnitudes", "subnormal accelerations", _magnitudes),
-    Category("float32", "results kept in single precision: subnormal there", _float32, "float32"),
+CATEGORIES: tuple[Category, ...] = (
+    just_above_yield,
+    mode_limit,
+    near_failure,
+    level_plane,
+    uplift,
+    limit_undefined,
+    friction_not_decaying,
+    sharp_decay,
+    tangential_onset,
+    restick,
+    stop_at_next_onset,
+    vanishing_kd,
+    many_cycles,
+    frequencies,
+    magnitudes,
+    float32,
 )
-DTYPES = {category.name: category.dtype for category in CATEGORIES}
+
+
+def dtype_of(category: str) -> str:
+    """Type in which the results of a category are kept."""
+    return "float32" if category == "float32" else "float64"
 
 
 def neighbours(cell: Cell) -> Iterator[Cell]:
@@ -272,16 +276,14 @@ def neighbours(cell: Cell) -> Iterator[Cell]:
                     yield {**cell, name: moved}
 
 
-def _half_ulp(value: mpf, dtype: str) -> mpf:
-    return mpf(float(np.spacing(np.dtype(dtype).type(abs(value))))) / 2
+def bound_of(value: mpf, others: Iterable[mpf], dtype: str = "float64") -> mpf:
+    """How far a result is from those of its neighbours that have one, plus half an ulp of its own."""
+    moves = [abs(other - value) for other in others if not mp.isnan(other)]
+    return max(moves, default=mpf(0)) + mpf(float(np.spacing(np.dtype(dtype).type(abs(value))))) / 2
 
 
 def conditioning(cell: Cell, dtype: str = "float64") -> dict[str, str]:
-    """The reference's answer, and the conditioning bounds of displacement and peak velocity.
-
-    A bound is the greatest change of the exact answer as one of the inputs moves by one ulp,
-    neighbours that have no value left out, plus half an ulp of the answer itself.
-    """
+    """The reference's answer, and the bounds of displacement and peak velocity, as one input moves by one ulp."""
     answer = reference.solve(**cell)
     others = [reference.solve(**other) for other in neighbours(cell)]
     found = {"sliding_mode": str(answer.sliding_mode), "validity": str(answer.validity)}
@@ -291,12 +293,9 @@ def conditioning(cell: Cell, dtype: str = "float64") -> dict[str, str]:
             ("peak_relative_velocity", "velocity_bound"),
         ):
             value = getattr(answer, result)
-            if mp.isnan(value):
-                found[result] = found[bound] = ""
-                continue
-            moves = [abs(getattr(other, result) - value) for other in others]
-            moved = max((move for move in moves if not mp.isnan(move)), default=mpf(0))
-            found[result] = nstr(value, 30)
-            found[bound] = nstr(moved + _half_ulp(value, dtype), 6)
+            has_none = mp.isnan(value)
+            found[result] = "" if has_none else nstr(value, 30)
+            moved = bound_of(value, (getattr(other, result) for other in others), dtype)
+            found[bound] = "" if has_none else nstr(moved, 6)
     outcomes = sorted({(other.sliding_mode, other.validity) for other in [answer, *others]})
     return {**found, "outcomes": " ".join(f"{mode}:{validity}" for mode, validity in outcomes)}

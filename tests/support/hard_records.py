@@ -6,12 +6,13 @@
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from mpmath import mpf, workdps
 from numpy.typing import NDArray
 
+from tests.support.hard_cells import bound_of
 from tests.support.reference import RecordSolution, solve_record
 
 Floats = NDArray[np.float64]
@@ -28,13 +29,8 @@ class Cell:
     scale: float = 1.0
 
 
-@dataclass(frozen=True)
-class Category:
-    """Cells that are hard for one reason."""
-
-    name: str
-    danger: str
-    cells: Callable[[], Iterator[Cell]]
+#: Cells that are hard for one reason, which is the docstring.
+Category: TypeAlias = Callable[[], Iterator[Cell]]
 
 
 def solve(cell: Cell) -> RecordSolution:
@@ -57,21 +53,16 @@ def neighbours(cell: Cell) -> Iterator[Cell]:
         if cell.times is None:
             yield replace(cell, interval=math.nextafter(cell.interval, toward))
         else:
-            yield replace(
-                cell, times=np.nextafter(cell.times, np.where(np.arange(cell.times.size) % 2, toward, -toward))
-            )
+            turns = np.where(np.arange(cell.times.size) % 2, toward, -toward)
+            yield replace(cell, times=np.nextafter(cell.times, turns))
 
 
 def conditioning(cell: Cell) -> tuple[RecordSolution, mpf, mpf]:
     """The exact response, and how far displacement and peak velocity move: plus half an ulp of their own."""
     own, others = solve(cell), [solve(other) for other in neighbours(cell)]
-    bounds = []
     with workdps(60):
-        for name in ("permanent_displacement", "peak_relative_velocity"):
-            value = getattr(own, name)
-            moves = (abs(getattr(other, name) - value) for other in others)
-            bounds.append(max(moves) + mpf(float(np.spacing(abs(float(value))))) / 2)
-    return own, bounds[0], bounds[1]
+        displacement = bound_of(own.permanent_displacement, (other.permanent_displacement for other in others))
+        return own, displacement, bound_of(own.peak_relative_velocity, (o.peak_relative_velocity for o in others))
 
 
 # ------------------------------------------------------------------------------------- cells
@@ -85,7 +76,8 @@ def _noise(seed: int, count: int, coarse: int = 1) -> Floats:
     return shaped / float(np.abs(shaped).max())
 
 
-def _onset_on_a_sample() -> Iterator[Cell]:
+def onset_on_a_sample() -> Iterator[Cell]:
+    """Üy is a sample, or its neighbour: a slide begins at an end of a piece."""
     for seed in range(8):
         samples = _noise(seed, 60)
         rising = np.flatnonzero((samples[1:-1] > 0.05) & (samples[2:] > samples[1:-1])) + 1
@@ -94,7 +86,8 @@ def _onset_on_a_sample() -> Iterator[Cell]:
         yield Cell(samples, math.nextafter(onset, (-1) ** seed * math.inf), interval=0.02)
 
 
-def _peak_just_above() -> Iterator[Cell]:
+def peak_just_above() -> Iterator[Cell]:
+    """a peak one ulp above Üy: the slide is all cancellation."""
     for seed in range(5):
         samples = _noise(100 + seed, 40)
         peak = float(samples.max())
@@ -104,7 +97,8 @@ def _peak_just_above() -> Iterator[Cell]:
             yield Cell(samples, peak - ulps * float(np.spacing(peak) / 2.0), interval=0.01)
 
 
-def _plateaus() -> Iterator[Cell]:
+def plateaus() -> Iterator[Cell]:
+    """plateaus at Üy, just above and just below."""
     for onset in (0.3, 1.0, 0.1):
         for above in (0.0, 1e-15, 1e-8, 1e-2):
             high = onset * (1.0 + above)
@@ -113,7 +107,8 @@ def _plateaus() -> Iterator[Cell]:
             yield Cell(np.array([high, high, 0.0, onset, onset, 3 * onset, onset, 0.0]), onset, interval=0.05)
 
 
-def _duplicated_zeros() -> Iterator[Cell]:
+def duplicated_zeros() -> Iterator[Cell]:
+    """rests at zero, zeros twice, numbers next to zero."""
     for gap in (1, 2, 7):
         rest = [0.0] * gap
         for onset in (0.2, 0.5, 0.99):
@@ -123,7 +118,8 @@ def _duplicated_zeros() -> Iterator[Cell]:
             yield Cell(np.array([0.0, 1e-300, 0.0, -0.0, 1.0, 0.0, 5e-324, 0.0, 0.7, -1.0, 0.0]), onset, interval=0.1)
 
 
-def _many_small_slips() -> Iterator[Cell]:
+def many_small_slips() -> Iterator[Cell]:
+    """hundreds of slips of some 1e-9 m: rounding adds up."""
     # each of about 1e-9 m: a triangle that exceeds the onset by 2 %
     for seed, count in enumerate((100, 200)):
         tops = 1.0 + 0.02 * np.random.default_rng(seed).uniform(0.5, 1.0, count)
@@ -132,7 +128,8 @@ def _many_small_slips() -> Iterator[Cell]:
         yield Cell(samples, 1.0, interval=0.01)
 
 
-def _intervals() -> Iterator[Cell]:
+def intervals() -> Iterator[Cell]:
+    """intervals from 1e-6 s to 10 s, even or not."""
     for seed, interval in enumerate((1e-6, 1e-5, 1e-4, 1e-3, 0.1, 1.0, 3.0, 10.0)):
         for onset in (0.05, 0.4):
             yield Cell(_noise(200 + seed, 50), onset, interval=interval)
@@ -142,14 +139,16 @@ def _intervals() -> Iterator[Cell]:
         yield Cell(_noise(220 + seed, 50), 0.1, times=times)
 
 
-def _magnitudes() -> Iterator[Cell]:
+def magnitudes() -> Iterator[Cell]:
+    """accelerations from 1e-25 to 1e25."""
     for seed, size in enumerate((1e-25, 1e-20, 1e-10, 1e-5, 1e5, 1e10, 1e20, 1e25)):
         for onset in (0.02, 0.8):
             yield Cell(size * _noise(300 + seed, 40), size * onset, interval=0.02)
         yield Cell(_noise(300 + seed, 40), 0.3 * size, interval=0.02, scale=size)
 
 
-def _never_at_rest() -> Iterator[Cell]:
+def never_at_rest() -> Iterator[Cell]:
+    """Üy next to nothing: V is carried on beyond the record."""
     # small onsets: V is carried from pulse to pulse, and the record ends before the slide
     for seed in range(4):
         samples = _noise(400 + seed, 80)
@@ -157,7 +156,8 @@ def _never_at_rest() -> Iterator[Cell]:
             yield Cell(np.abs(samples) if seed % 2 else samples, onset, interval=0.01)
 
 
-def _stop_at_a_sample() -> Iterator[Cell]:
+def stop_at_a_sample() -> Iterator[Cell]:
+    """V reaches 0 at a sample, or just as the next slide begins."""
     # a rectangle in doubles: V is exactly 0 at a sample, at the next onset, or not quite
     for onset in (0.25, 0.5, 0.125):
         for level in (1.0, 2.0, 1.5):
@@ -168,16 +168,14 @@ def _stop_at_a_sample() -> Iterator[Cell]:
                 yield Cell(np.array([0.0, level, *again, onset, level, 0.0, -onset, 0.0]), onset, interval=0.25)
 
 
-CATEGORIES = (
-    Category(
-        "onset_on_a_sample", "Üy is a sample, or its neighbour: a slide begins at an end of a piece", _onset_on_a_sample
-    ),
-    Category("peak_just_above", "a peak one ulp above Üy: the slide is all cancellation", _peak_just_above),
-    Category("plateaus", "plateaus at Üy, just above and just below", _plateaus),
-    Category("duplicated_zeros", "rests at zero, zeros twice, numbers next to zero", _duplicated_zeros),
-    Category("many_small_slips", "hundreds of slips of some 1e-9 m: rounding adds up", _many_small_slips),
-    Category("intervals", "intervals from 1e-6 s to 10 s, even or not", _intervals),
-    Category("magnitudes", "accelerations from 1e-25 to 1e25", _magnitudes),
-    Category("never_at_rest", "Üy next to nothing: V is carried on beyond the record", _never_at_rest),
-    Category("stop_at_a_sample", "V reaches 0 at a sample, or just as the next slide begins", _stop_at_a_sample),
+CATEGORIES: tuple[Category, ...] = (
+    onset_on_a_sample,
+    peak_just_above,
+    plateaus,
+    duplicated_zeros,
+    many_small_slips,
+    intervals,
+    magnitudes,
+    never_at_rest,
+    stop_at_a_sample,
 )

@@ -334,8 +334,8 @@ def solve_record(
         ends = [*(begin for begin, _, _ in pulses[1:]), len(sections)]
         for (begin, end, peak), following in zip(pulses, ends, strict=False):
             parameters = friction(peak)
-            mode = parameters.sliding_mode
-            validity |= parameters.validity
+            mode = CONTINUOUS if parameters.acceleration_ratio > 1 and not block.newmark else STICK_SLIP
+            validity |= parameters.validity & ~UPLIFT  # which the record itself tells
             validity |= NOT_RECOUPLED * bool(block.v > 0 and not block.newmark and modes and modes[-1] == STICK_SLIP)
             if validity & (STATICALLY_UNSTABLE | UPLIFT | LIMIT_UNDEFINED | FRICTION_NOT_DECAYING):
                 return RecordSolution(mp.nan, mp.nan, -1, -1, -1, validity)

@@ -8,6 +8,7 @@ from itertools import pairwise
 from typing import Any, TypeAlias
 
 from mpmath import mp, mpf, workdps
+from scipy.special import roots_legendre
 
 Function: TypeAlias = Callable[[mpf], mpf]
 
@@ -16,18 +17,10 @@ Function: TypeAlias = Callable[[mpf], mpf]
 def _gauss_legendre(count: int, precision: int) -> list[tuple[mpf, mpf]]:
     """Nodes and weights of the `count`-point rule on (0, 1), at `precision` bits."""
     rule = []
-    for i in range(count):
-        node = mpf(math.cos(math.pi * (i + 0.75) / (count + 0.5)))
-        for _ in range(precision.bit_length()):
-            before, value = mpf(1), node
-            for n in range(2, count + 1):
-                before, value = value, ((2 * n - 1) * node * value - (n - 1) * before) / n
-            slope = count * (node * value - before) / (node**2 - 1)
-            step = value / slope
-            node -= step
-            if abs(step) < mpf(2) ** (-precision // 2 - 4):
-                break
-        rule.append(((1 + node) / 2, 1 / ((1 - node**2) * slope**2)))
+    for near in roots_legendre(count)[0]:
+        node = mp.findroot(lambda x: mp.legendre(count, x), mpf(near))
+        weight = (1 - node**2) / ((count + 1) * mp.legendre(count + 1, node)) ** 2
+        rule.append(((1 + node) / 2, weight))
     return rule
 
 
@@ -35,13 +28,10 @@ def root(f: Function, low: mpf, high: mpf) -> mpf:
     """Root of `f` in a bracket: bisection made faster by inverse quadratic steps (Chandrupatla)."""
     a, b = high, low
     f_a, f_b = f(a), f(b)
-    if f_a == 0:
-        return a
-    if f_b == 0:
-        return b
+    if f_a == 0 or f_b == 0:
+        return a if f_a == 0 else b
     assert mp.sign(f_a) != mp.sign(f_b), "no change of sign in the bracket"
     width = mpf(1) / 2
-    epsilon = mp.eps * 4
     while True:
         x = a + width * (b - a)
         f_x = f(x)
@@ -52,7 +42,7 @@ def root(f: Function, low: mpf, high: mpf) -> mpf:
             b, f_b = a, f_a
         a, f_a = x, f_x
         best = a if abs(f_a) < abs(f_b) else b
-        tolerance = epsilon * abs(best) / abs(b - a) if b != a else mpf(1)
+        tolerance = 4 * mp.eps * abs(best) / abs(b - a) if b != a else mpf(1)
         if tolerance > 0.5 or f_a == 0:
             return best
         xi, phi = (a - b) / (c - b), (f_a - f_b) / (f_c - f_b)

@@ -1,6 +1,6 @@
 """Cells under a sine solved twice, thousands at once: in SIMD batches, and from event to event as under any wave.
 
-`tests/kernels/test_wave_accuracy.py` does so for some sweeps, ``python -m benchmarks.agreement`` for many.
+`tests/kernels/test_agreement.py` does so for some sweeps, ``python -m benchmarks.agreement`` for many.
 """
 
 from dataclasses import dataclass
@@ -48,9 +48,8 @@ class Drawn:
 
     def cell(self, at: int) -> str:
         """One of them, to be solved again."""
-        return (
-            f"{self.cycles} cycles, {self.model}: { {name: float(values[at]) for name, values in self.cells.items()} }"
-        )
+        cell = {name: float(values[at]) for name, values in self.cells.items()}
+        return f"{self.cycles} cycles, {self.model}: {cell}"
 
 
 def drawn(seed: int, count: int) -> Drawn:
