@@ -19,20 +19,20 @@ ORDER = (
 #: Lines that a folder may have, docstrings and blanks among them.  More is a reason to look for the simpler thing;
 #: whoever takes something away lowers the limit.
 LINES = {
-    "jit": 338,
-    "model": 1_447,
-    "motion": 2_052,
-    "kernels": 3_242,
-    "grid": 1_171,
-    "studies": 4_256,
+    "jit": 315,
+    "model": 1_395,
+    "motion": 2_010,
+    "kernels": 3_150,
+    "grid": 1_125,
+    "studies": 4_115,
     "files": 2_000,
     "charts": 2_520,
     "explore": 735,
-    "cli": 1_460,
+    "cli": 1_370,
 }
 
 #: Modules in all, and lines of a function's body.
-MOST_MODULES, MOST_LINES = 113, 90
+MOST_MODULES, MOST_LINES = 110, 90
 
 #: Names of ours that a module imports at its head.
 MOST_NAMES = 20
