@@ -43,7 +43,7 @@ class Output:
     """Where the result goes and what it holds: the table [output]; `variables` None: those of the kind of sweep."""
 
     path: str | None = None
-    title: str = "Permanent displacement of a rigid block on a shaken inclined plane"
+    title: str = "Permanent displacement of a rigid block on a shaken inclined base"
     variables: list[str] | None = None
     dtype: str = "float64"
     compression: int = 0

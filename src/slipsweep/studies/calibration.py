@@ -63,7 +63,7 @@ def calibrate(
         (m/s) and `relative_displacement` (m), downslope positive; NaN or a blank cell where there is no sample.
         Several tests of one interface are calibrated together.
     theta, mu_s, phi : float
-        Inclination of the plane, degrees, and static friction coefficient, or its angle, degrees: mu_s = tan phi.
+        Inclination of the base, degrees, and static friction coefficient, or its angle, degrees: mu_s = tan phi.
     model : Mendez or str
         The rules of motion.
     offset, drift : str or list of str

@@ -202,7 +202,7 @@ def measured_friction(
         (m/s2)``; or a Dataset along `time` (s) with `ground_acceleration` (the table's) and `block_acceleration`,
         in m/s² or in the unit of their attribute `units`.  Samples need not be evenly spaced.
     theta, mu_s, phi : float
-        Inclination of the plane, degrees, and static friction coefficient, or its angle, degrees: mu_s = tan phi.
+        Inclination of the base, degrees, and static friction coefficient, or its angle, degrees: mu_s = tan phi.
     g : float
         Gravity, m/s².
     offset, drift : str or list of str
