@@ -50,10 +50,7 @@ def block_in_pulse(
 
 @inlined
 def slides_continuously(interface: physics.Interface, options: Options, peak: float) -> bool:
-    """Whether the block slides continuously in a pulse of that peak.
-
-    Not its own mode, which is missing where the harmonic motion of that peak would uplift.
-    """
+    """Whether a block slides continuously in a pulse of that peak: its mode is missing where a sine would uplift it."""
     return options.rise != physics.NEWMARK and peak > interface.limiting_acceleration
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from slipsweep.jit.decorators import scalar, single
 from slipsweep.kernels.block import (
+    EQ12,
     FRICTION_ESTIMATED,
     NEAR_MODE_LIMIT,
     NO_VALUE,
@@ -63,9 +64,8 @@ def train_of(
     def train(block: Block, options: Options, wave: Wave, workspace: Any) -> Pulse:
         """All pulses of a stick-slip (or Newmark) block, as one.
 
-        Where the map of the repeated cycle returns to a velocity seen before, the cycles in between
-        repeat; where the block never rests within it, the velocity changes by the same amount
-        each time and W is an arithmetic series.
+        Where the map of the repeated cycle returns to a velocity seen before, the cycles in between repeat; where the
+        block never rests within it, V changes by the same amount each time and W is an arithmetic series.
         """
         k = first_pulse(block, wave, 0)
         now, k = pulses(block, options, wave, workspace, k, wave.cycle[wave.lead], 0.0)
@@ -86,6 +86,9 @@ def train_of(
             done += 1
             left -= 1
             if before == 0.0 and velocity == 0.0:
+                alone = wave.cycle.size == wave.lead + 3 and wave.shape[wave.lead + 1] == wave.shape[wave.lead]
+                if alone and options.recoupling == EQ12:  # the last cycle: Eq. 12 ends alike where no pulse follows
+                    left, after = left + 1, wave.height.size
                 displacement += left * now.displacement
                 break
             if now.least > 0.0:
