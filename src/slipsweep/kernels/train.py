@@ -9,21 +9,8 @@ from collections.abc import Callable
 from typing import Any
 
 from slipsweep.jit.decorators import scalar, single
-from slipsweep.kernels.block import (
-    EQ12,
-    FRICTION_ESTIMATED,
-    NEAR_MODE_LIMIT,
-    NO_VALUE,
-    NOT_RECOUPLED,
-    UNSOLVED,
-    YIELD_GOVERNS,
-    Block,
-    Cell,
-    Motion,
-    Options,
-    block_of,
-    interface_of,
-)
+from slipsweep.kernels import block as physics
+from slipsweep.kernels.block import Block, Cell, Motion, Options, block_of, interface_of
 from slipsweep.kernels.pulse import Pulse, first_pulse, motion_of
 from slipsweep.model import equations as eq
 from slipsweep.model.friction import FrictionLaw
@@ -53,10 +40,10 @@ def train_of(
             peak, least = max(peak, now.peak), min(least, now.least)
             validity |= now.validity
             if velocity > 0.0 and now.validity == 0:
-                validity |= NOT_RECOUPLED
-            if math.isnan(now.displacement + now.peak) and validity & NO_VALUE == 0:
-                validity |= UNSOLVED
-            if validity & NO_VALUE:
+                validity |= physics.NOT_RECOUPLED
+            if math.isnan(now.displacement + now.peak) and validity & physics.NO_VALUE == 0:
+                validity |= physics.UNSOLVED
+            if validity & physics.NO_VALUE:
                 break
         return Pulse(velocity, displacement, peak, least, 0.0, validity), k
 
@@ -74,11 +61,11 @@ def train_of(
         seen_velocity, seen_displacement, seen_at, next_look = velocity, displacement, 0, 1
         done, left = 0, wave.repeats
         after = k
-        while left > 0 and validity & NO_VALUE == 0:
+        while left > 0 and validity & physics.NO_VALUE == 0:
             before = velocity
             now, after = pulses(block, options, wave, workspace, k, wave.cycle[wave.lead + 1], before)
             validity |= now.validity
-            if validity & NO_VALUE:
+            if validity & physics.NO_VALUE:
                 break
             velocity = now.velocity
             displacement += now.displacement
@@ -87,7 +74,8 @@ def train_of(
             left -= 1
             if before == 0.0 and velocity == 0.0:
                 alone = wave.cycle.size == wave.lead + 3 and wave.shape[wave.lead + 1] == wave.shape[wave.lead]
-                if alone and options.recoupling == EQ12:  # the last cycle: Eq. 12 ends alike where no pulse follows
+                # the last cycle, which Eq. 12 ends in the same way though no pulse follows
+                if alone and options.recoupling == physics.EQ12:
                     left, after = left + 1, wave.height.size
                 displacement += left * now.displacement
                 break
@@ -110,12 +98,12 @@ def train_of(
             elif done == next_look:
                 seen_velocity, seen_displacement, seen_at = velocity, displacement, done
                 next_look *= 2
-        if validity & NO_VALUE == 0:
+        if validity & physics.NO_VALUE == 0:
             now, _ = pulses(block, options, wave, workspace, after, wave.pieces.shape[0], velocity)
             validity |= now.validity
             displacement += now.displacement
             peak = max(peak, now.peak)
-        if validity & NO_VALUE:
+        if validity & physics.NO_VALUE:
             displacement = peak = math.nan
         return Pulse(velocity, displacement, peak, 0.0, 0.0, validity)
 
@@ -137,12 +125,13 @@ def cell_solver_of(
         block, mode = block_of(law, cell.amplitude, cell, interface, options), interface.sliding_mode
         # ramps may keep the shaking below its peak, and a block from sliding
         slides, unknown = block.amplitude * wave.highest > block.yield_acceleration, math.nan if mode < 0 else 0.0
-        validity = interface.validity if slides else interface.validity & ~(NEAR_MODE_LIMIT | FRICTION_ESTIMATED)
+        remarks = 0 if slides else physics.NEAR_MODE_LIMIT | physics.FRICTION_ESTIMATED
+        validity = interface.validity & ~remarks
         found = Pulse(0.0, unknown, unknown, 0.0, 0.0, 0)
         if mode == eq.CONTINUOUS:
             found = slide_continuously(block, options, wave, workspace)
         elif mode == eq.STICK_SLIP and slides:
-            validity |= YIELD_GOVERNS if yield_governs(block, wave) else 0
+            validity |= physics.YIELD_GOVERNS if yield_governs(block, wave) else 0
             found = train(block, options, wave, workspace)
         return motion_of(block, mode, validity, found)
 
