@@ -73,7 +73,7 @@ class Tally:
 
 def tally_of(results: xr.Dataset) -> Tally:
     """Count results, read in chunks; what is not counted is not read (InputError: not of the same cells)."""
-    if {"flag_share", "valueless_share"} <= results.data_vars.keys():
+    if {"flag_share", "flag", "valueless_share"} <= results.variables.keys():
         return _tally_of_samples(results)
     names = [name for name in ("sliding_mode", "validity") if name in results.data_vars]
     if len({results[name].size for name in names}) > 1:
@@ -105,10 +105,10 @@ def _tally_of_samples(results: xr.Dataset) -> Tally:
 
     valueless = results["valueless_share"]
     tally = Tally(valueless.size, flags={Validity(flag): share for flag, share in sums("flag_share", "flag").items()})
-    if "mode_share" in results.data_vars:
+    if {"mode_share", "mode"} <= results.variables.keys():
         tally.modes = {SlidingMode.MISSING: float(valueless.sum(dtype=np.float64))}
         tally.modes |= {SlidingMode(mode): share for mode, share in sums("mode_share", "mode").items()}
-    if {"sensitivity_status", "first_order_index", "total_index"} <= results.data_vars.keys():
+    if {"sensitivity_status", "first_order_index", "total_index", "input"} <= results.variables.keys():
         status = results["sensitivity_status"]
         both = [results[name].transpose(*status.dims, "input").values for name in ("first_order_index", "total_index")]
         rows = np.stack(both).reshape(2, -1, results.sizes["input"]).astype(np.float64)
