@@ -320,7 +320,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"frequency": None}, "frequency: must be given"),
     (
         {"amplitude": None, "displacement_amplitude": [1e30, 1.0], "frequency": [1.0, 9e4]},
-        "displacement_amplitude = 1e+30: with frequency = 90000 its amplitude A = (2 pi f)^2 d must be a finite",
+        "displacement_amplitude = 1e+30: with frequency = 90000, A = (2 pi f)^2 d = 3.",
     ),
     ({"cycles": 0}, "cycles = 0: must be a whole number >= 1"),
     ({"cycles": 2.5}, "cycles = 2.5: must be a whole number >= 1"),

@@ -180,7 +180,7 @@ def test_served_or_refused_by_name(way: str) -> None:
         ({"yield_acceleration": -1e31}, "yield_acceleration = -1e+31: must be a finite number from -1e+30 to 1e+30"),
         (
             {"amplitude": None, "displacement_amplitude": [0.1, 1e20], "frequency": [1.0, 1e8]},
-            "displacement_amplitude = 1e+20: with frequency = 100000000 its amplitude A = (2 pi f)^2 d must be",
+            "displacement_amplitude = 1e+20: with frequency = 1e+08, A = (2 pi f)^2 d = ",
         ),
         (
             {"amplitude": [0.0, 2.0], "variables": ["permanent_displacement", "decay_rate"]},

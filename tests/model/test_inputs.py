@@ -13,7 +13,7 @@ import xarray as xr
 
 import slipsweep
 from slipsweep import InputError
-from slipsweep.model.parameters import check_values, friction_coefficient, with_friction_coefficient
+from slipsweep.model.parameters import check_values
 
 RECORD = slipsweep.Record(np.arange(5) / 10, np.array([0.0, 4.0, -4.0, 2.0, 0.0]))
 UNCERTAIN = {"mu_s": {"distribution": "lognorm", "s": 0.1, "kind": "factor"}}
@@ -150,25 +150,25 @@ def test_numbers_of_other_types(number: Any) -> None:
 
 
 def test_a_friction_angle_is_its_tangent_along_its_own_dimension() -> None:
-    found = friction_coefficient([20.0, 30.0])
-    np.testing.assert_allclose(found.values, np.tan(np.radians([20.0, 30.0])), rtol=1e-15)
-    assert found.dims == ("phi",)
-    assert found.phi.attrs["units"] == "degree"
-    expected = call("sweep", mu_s=found.values).permanent_displacement.values
-    result = call("sweep", mu_s=found)
+    tangents = np.tan(np.radians([20.0, 30.0]))
+    expected = call("sweep", mu_s=tangents).permanent_displacement.values
+    result = call("sweep", mu_s=None, phi=[20.0, 30.0])
     np.testing.assert_array_equal(result.permanent_displacement.values, expected)
+    np.testing.assert_allclose(result.mu_s, tangents, rtol=1e-15)
+    assert result.permanent_displacement.dims == result.mu_s.dims == ("phi",)
     assert result.phi.values.tolist() == [20.0, 30.0]
-    given = with_friction_coefficient({"theta": 5.0, "mu_s": None, "phi": xr.DataArray([20.0, 30.0], dims="case")})
-    assert given["mu_s"].dims == ("case",)
-    assert "phi" not in given
+    assert result.phi.attrs["units"] == "degree"
+    cases = call("sweep", mu_s=None, phi=xr.DataArray([20.0, 30.0], dims="case"))
+    assert cases.mu_s.dims == cases.phi.dims == ("case",)
+    np.testing.assert_array_equal(cases.permanent_displacement.values, expected)
 
 
 @pytest.mark.parametrize("phi", [0.0, 90.0, -1.0, np.nan, "a"])
 def test_friction_angles_that_are_none(phi: Any) -> None:
     with pytest.raises(InputError, match=r"^phi = "):
-        friction_coefficient(phi)
+        call("sweep", mu_s=None, phi=phi)
     with pytest.raises(InputError, match="phi, mu_s: must not both be given"):
-        with_friction_coefficient({"mu_s": 0.3, "phi": 20.0})
+        call("sweep", mu_s=0.3, phi=20.0)
 
 
 def test_what_brings_a_unit_is_converted() -> None:

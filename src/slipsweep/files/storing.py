@@ -31,7 +31,7 @@ from slipsweep.files import netcdf
 from slipsweep.files.jobs import Job
 from slipsweep.files.opening import check_zarr
 from slipsweep.files.outputs import EXISTS, appear, writing
-from slipsweep.grid.chunks import Chunk, places
+from slipsweep.grid.chunks import Chunk
 from slipsweep.grid.plans import Plan
 from slipsweep.grid.resources import size_text
 
@@ -231,8 +231,7 @@ class NetcdfChunks(Chunks):
 
 
 def _region(chunk: Chunk, result: netCDF4.Variable) -> Any:
-    sizes = dict(zip(result.dimensions, result.shape, strict=True))
-    return tuple(places(chunk, sizes).values()) or ...
+    return tuple(chunk.get(dim, slice(None)) for dim in result.dimensions) or ...
 
 
 class ZarrChunks(Chunks):

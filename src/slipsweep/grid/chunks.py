@@ -2,8 +2,10 @@
 
 import itertools
 import math
-from collections.abc import Collection, Hashable, Iterator, Mapping
-from typing import TypeAlias, TypeVar
+from collections.abc import Collection, Iterator, Mapping
+from typing import TypeAlias
+
+import xarray as xr
 
 #: A part of a grid: where it lies along each dimension.
 Chunk: TypeAlias = dict[str, slice]
@@ -14,16 +16,14 @@ CHUNK_CELLS = 4_000_000
 #: Lengths of the chunks along each dimension of a grid.
 Lengths = Mapping[str, tuple[int, ...]]
 
-Dim = TypeVar("Dim", bound=Hashable)
 
-
-def chunk_lengths(shape: Mapping[Dim, int], most: int, together: Collection[Dim] = ()) -> dict[Dim, int]:
+def chunk_lengths(shape: Mapping[str, int], most: int, together: Collection[str] = ()) -> dict[str, int]:
     """Return the chunk of a grid: at most `most` cells, whole along the last dimensions as far as they allow.
 
     Its cells then follow one another in the file.  Among the last dimensions is the frequency, of which a
     whole axis costs `sweep` hardly more than one value.  Dimensions `together` are cut only where no other is left.
     """
-    lengths: dict[Dim, int] = {}
+    lengths: dict[str, int] = {}
     order, cells = sorted(shape, key=lambda dim: dim in together), 1
     for dim in reversed(order):
         # equal shares rather than full chunks and a remnant
@@ -33,7 +33,7 @@ def chunk_lengths(shape: Mapping[Dim, int], most: int, together: Collection[Dim]
     return {dim: lengths[dim] for dim in shape}
 
 
-def grid_chunks(shape: Mapping[Dim, int], most: int, together: Collection[Dim] = ()) -> Iterator[dict[Dim, slice]]:
+def grid_chunks(shape: Mapping[str, int], most: int, together: Collection[str] = ()) -> Iterator[Chunk]:
     """Cut a grid into chunks as `chunk_lengths` says, in the order of the file; a grid without cells has none."""
     if 0 not in shape.values():
         lengths = chunk_lengths(shape, most, together)
@@ -42,18 +42,11 @@ def grid_chunks(shape: Mapping[Dim, int], most: int, together: Collection[Dim] =
             yield {dim: slice(start, min(start + lengths[dim], shape[dim])) for dim, start in starts.items()}
 
 
-def slabs(shape: tuple[int, ...], most: int) -> Iterator[tuple[slice, ...]]:
-    """Cut a grid whose dimensions have no names."""
-    for chunk in grid_chunks(dict(enumerate(shape)), most):
-        yield tuple(chunk.values())
+def sizes_within(chunk: Chunk, sizes: Mapping[str, int]) -> dict[str, int]:
+    """Lengths of the dimensions of a grid within a chunk of it."""
+    return {dim: chunk[dim].stop - chunk[dim].start if dim in chunk else size for dim, size in sizes.items()}
 
 
-def places(chunk: Mapping[str, slice], sizes: Mapping[str, int]) -> dict[str, slice]:
-    """Where a chunk lies in what has these dimensions: in all of those that are none of the grid's."""
-    return {dim: chunk.get(dim, slice(0, length)) for dim, length in sizes.items()}
-
-
-def chunk_at(lengths: Lengths, index: tuple[int, ...]) -> Chunk:
-    """Where the chunk of this index lies in the grid."""
-    edges = ((sum(own[:at]), own[at]) for own, at in zip(lengths.values(), index, strict=True))
-    return {dim: slice(start, start + length) for dim, (start, length) in zip(lengths, edges, strict=True)}
+def variables_within(chunk: Chunk, variables: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:
+    """The part of variables that lies within a chunk: views, cut along the dimensions that they have."""
+    return {name: one.isel(chunk, missing_dims="ignore") for name, one in variables.items()}

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.model import parameters
@@ -70,11 +69,9 @@ class Inputs:
 
     @property
     def given(self) -> dict[str, Any]:
-        """The parameters that are given; of `phi` the friction coefficient, an array that has it as a coordinate."""
+        """The parameters that are given."""
         values = {one.name: getattr(self, one.name) for one in fields(self)}
-        return parameters.with_friction_coefficient(
-            {name: value for name, value in values.items() if value is not None}
-        )
+        return {name: value for name, value in values.items() if value is not None}
 
     def but(self, others: Mapping[str, Any]) -> "Inputs":
         """The same with other values of some parameters; None leaves one out."""
@@ -91,15 +88,10 @@ def check_parameters(problem: Problem, inputs: Inputs) -> dict[str, xr.Variable]
         _check_interface(problem.model, given)
         parameters.check_given(given, ("frequency",))
         found = checked(given, problem.model.g)
-        if "displacement_amplitude" in found:
-            # A grows with both
+        if "displacement_amplitude" in found:  # A grows with both
             d, f = (found[name].values.max() for name in ("displacement_amplitude", "frequency"))
-            bound, texts = parameters.BOUNDS["amplitude"], [parameters.number_text(float(one)) for one in (d, f)]
-            if not bound.holds(peak_acceleration(d, f)):
-                raise InputError(
-                    f"displacement_amplitude = {texts[0]}: with frequency = {texts[1]} its amplitude "
-                    f"A = (2 pi f)^2 d must be {bound.text}"
-                )
+            key = f"displacement_amplitude = {d:g}: with frequency = {f:g}, A = (2 pi f)^2 d"
+            parameters.check_single("amplitude", peak_acceleration(d, f), key)
         return found
     _refuse_others(given, f"a {type(motion).__name__}", known.RECORD_INPUTS)
     _check_interface(problem.model, given)
@@ -135,7 +127,8 @@ def _refuse_others(given: Mapping[str, Any], what: str, taken: tuple[str, ...]) 
 def _check_interface(model: Model, given: Mapping[str, Any]) -> None:
     """Refuse an interface that is not known, or known twice."""
     if "yield_coefficient" not in given:
-        parameters.check_given(given, ("theta", "mu_s"))
+        parameters.check_given(given, ("theta",))
+        parameters.check_friction(given)
         return
     if not isinstance(model, Newmark):
         raise InputError(
@@ -185,7 +178,7 @@ def _check_moving(motion: Record | Suite, coords: Mapping[str, xr.Variable], str
 def checked(given: Mapping[str, Any], g: float) -> dict[str, xr.Variable]:
     """Every parameter as a float64 array with named dimensions, within its bounds, described.
 
-    `g` is what "g" as the unit of an array stands for.
+    `g` is what "g" as the unit of an array stands for.  With `phi` there is its tangent, `mu_s`.
     """
     checked = {}
     for name, one in given.items():
@@ -203,8 +196,8 @@ def checked(given: Mapping[str, Any], g: float) -> dict[str, xr.Variable]:
         if values.size == 0:
             raise InputError(f"{name} = []: must hold at least one value")
         checked[name] = xr.Variable(dims, values, attrs)
-        if name == "mu_s" and isinstance(one, xr.DataArray) and "phi" in one.coords:
-            checked["phi"] = one["phi"].variable.to_base_variable()
+        if name == "phi":
+            checked["mu_s"] = xr.Variable(dims, parameters.friction_coefficient(values), known.PARAMETERS["mu_s"])
     return checked
 
 
@@ -217,11 +210,6 @@ def grid_sizes(variables: Mapping[str, xr.Variable]) -> dict[str, int]:
                 raise InputError(f"{name}: {size} values along {dim!r}, where another parameter has {sizes[dim]}")
     order = [*dict.fromkeys((*known.DIMENSION_ORDER, *sizes))]
     return {dim: sizes[dim] for dim in order if dim in sizes}
-
-
-def aligned(variables: Mapping[str, xr.Variable], sizes: Mapping[str, int]) -> dict[str, NDArray[Any]]:
-    """Plain arrays with all dimensions, of length 1 where they do not vary."""
-    return {name: one.set_dims(tuple(sizes)).values for name, one in variables.items()}
 
 
 def inputs_of(problem: Problem, coords: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:

@@ -20,36 +20,25 @@ from slipsweep.grid import inputs as grid_inputs
 from slipsweep.grid.solvers import ROWS, cost_of, memory_of
 from slipsweep.model import options
 from slipsweep.model import variables as known
-from slipsweep.model.parameters import check_choices, check_given, check_progress
+from slipsweep.model.parameters import check_choices, check_friction, check_given, check_progress
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform, peak_acceleration
 
 #: What Eqs. 7-11 depend on.
-_FRICTION_INPUTS = (
-    "theta", "mu_s", "amplitude", "yield_acceleration", "yield_coefficient", "decay_rate", "delta_mu",
-    "minimum_friction",
-)  # fmt: skip
+_FRICTION_INPUTS = (*known.INTERFACE_INPUTS, "yield_coefficient", "amplitude")
 
 _ADVICE = "ask for fewer variables or cells, or give chunks= for a lazy result"
 
 _SOURCE = {"source": f"slipsweep {__version__}", "references": known.REFERENCE}
-
-Variables = Mapping[str, xr.Variable]
 
 
 @dataclass(frozen=True)
 class Task:
     """Results that lie on the same dimensions: what solves them (`engine.solve`, say), and its request."""
 
-    solver: Callable[[engine.Request], engine.Arrays]
-    dims: tuple[str, ...]
+    solver: Callable[[engine.Request], engine.Variables]
     request: engine.Request
-
-    @property
-    def sizes(self) -> dict[str, int]:
-        """The dimensions and their lengths."""
-        return dict(zip(self.dims, self.request.shape, strict=True))
 
 
 @dataclass
@@ -74,17 +63,13 @@ class Plan:
     @property
     def cells(self) -> int:
         """What there is to solve, in what `progress` counts."""
-        return _cells(self.sizes)
+        return math.prod(self.sizes.values())
 
     def part(self, chunk: chunks.Chunk) -> "Plan":
         """The plan of a chunk of the grid, which gives the same bits as the whole does there."""
-
-        def cut(task: Task) -> Task:
-            return replace(task, request=task.request.part(tuple(chunks.places(chunk, task.sizes).values())))
-
-        sizes = {dim: cut.stop - cut.start for dim, cut in chunks.places(chunk, self.sizes).items()}
-        coords = {name: one.isel(chunk, missing_dims="ignore") for name, one in self.coords.items()}
-        return replace(self, sizes=sizes, coords=coords, tasks=tuple(map(cut, self.tasks)))
+        sizes, coords = chunks.sizes_within(chunk, self.sizes), chunks.variables_within(chunk, self.coords)
+        tasks = tuple(replace(task, request=task.request.part(chunk)) for task in self.tasks)
+        return replace(self, sizes=sizes, coords=coords, tasks=tasks)
 
     def solve(self, progress: Callable[[int], None] | None = None) -> xr.Dataset:
         """Compute everything at once; InputError: memory cannot hold it.
@@ -92,13 +77,13 @@ class Plan:
         `progress` is told of cells as they are finished, from any thread.
         """
         check_progress(progress)
-        sizes = max((task.sizes for task in self.tasks), key=_cells, default={})
-        needed = _cells(sizes) * self.cell_memory
-        for task in self.tasks:
-            needed += _cells(task.sizes) * sum(dtype.itemsize for dtype in task.request.dtypes.values())
-        resources.check_memory(f"grid of {resources.grid_text(sizes)}, {_cells(sizes):.4g} cells", needed, _ADVICE)
+        requests = [task.request for task in self.tasks]
+        cells, grid = max(((one.cells, resources.grid_text(one.sizes)) for one in requests), default=(0, ""))
+        itemsizes = (one.cells * sum(dtype.itemsize for dtype in one.dtypes.values()) for one in requests)
+        needed = cells * self.cell_memory + sum(itemsizes)
+        resources.check_memory(f"grid of {grid}, {cells:.4g} cells", needed, _ADVICE)
 
-        def solve(task: Task) -> engine.Arrays:
+        def solve(task: Task) -> engine.Variables:
             # all tasks cover the same cells: one of them counts
             return task.solver(replace(task.request, progress=progress if task is self.tasks[0] else None))
 
@@ -107,9 +92,9 @@ class Plan:
     def template(self) -> xr.Dataset:
         """The results with their dimensions and coordinates but no values: zeros that take no memory."""
 
-        def zeros(task: Task) -> engine.Arrays:
-            dtypes = task.request.dtypes
-            return {name: np.broadcast_to(np.zeros((), dtypes[name]), task.request.shape) for name in dtypes}
+        def zeros(task: Task) -> engine.Variables:
+            sizes, dtypes = task.request.sizes, task.request.dtypes
+            return {name: xr.Variable((), np.zeros((), dtype)).set_dims(sizes) for name, dtype in dtypes.items()}
 
         return self._table(zeros)
 
@@ -117,52 +102,35 @@ class Plan:
         """The results as dask arrays in chunks of these lengths: nothing is computed before it is asked for."""
         import dask.array as da  # takes as long as xarray
 
-        # an array with one element a chunk of the grid, an object: all results of a chunk come out of one task
-        ones = tuple((1,) * len(own) for own in lengths.values())
-        meta = np.empty((0,) * len(ones), object)
-        solved = da.map_blocks(_solved, plan=self, lengths=dict(lengths), chunks=ones, dtype=object, meta=meta)
-        table, found = self.template(), {}
-        for name, result in table.data_vars.items():
-            # a result has some dimensions of the grid, in their order, and perhaps others of its own after them
-            own = [dim for dim in result.dims if dim in lengths]
-            values = da.map_blocks(
-                _result,
-                solved[tuple(slice(None) if dim in own else 0 for dim in lengths)] if lengths else solved,
-                result=name,
-                chunks=tuple(lengths[str(dim)] if dim in lengths else (result.sizes[dim],) for dim in result.dims),
-                new_axis=list(range(len(own), len(result.dims))) or None,
-                dtype=result.dtype,
-                meta=np.empty((0,) * result.ndim, result.dtype),
-            )
-            found[name] = xr.Variable(result.dims, values, result.attrs)
-        return xr.Dataset(found, table.coords, table.attrs)
+        table = self.template()
+        if not lengths:  # one cell
+            return self.solve().chunk()
+        zeros = {
+            name: da.zeros(one.shape, dtype=one.dtype, chunks=[lengths.get(str(dim), -1) for dim in one.dims])
+            for name, one in table.data_vars.items()
+        }
+        template = table.drop_vars(table.coords).copy(data=zeros)
+        blocks = {f"along {dim}": (dim, da.arange(sum(own), chunks=(own,))) for dim, own in lengths.items()}
+        # one task of the graph, which all chunks read
+        plan = da.from_array(np.array(self, object), name=False)
+        found = xr.map_blocks(_solved, xr.Dataset(blocks | {"plan": ((), plan)}), template=template)
+        return found.assign_coords(table.coords)
 
-    def _table(self, evaluate: Callable[[Task], Mapping[str, Any]]) -> xr.Dataset:
-        """The results, with `evaluate` giving a task's arrays."""
+    def _table(self, evaluate: Callable[[Task], engine.Variables]) -> xr.Dataset:
+        """The results, with `evaluate` giving a task's."""
         found = {
-            name: xr.Variable(task.dims, values, self.described[name])
+            name: xr.Variable(one.dims, one.data, self.described[name])
             for task in self.tasks
-            for name, values in evaluate(task).items()
+            for name, one in evaluate(task).items()
         }
         return xr.Dataset({name: found[name] for name in self.names}, self.coords, self.attrs)
 
 
-def _solved(plan: Plan, lengths: chunks.Lengths, block_id: tuple[int, ...]) -> np.ndarray:
-    """The results of a chunk, arrays by their names, as an element of an array."""
-    table = plan.part(chunks.chunk_at(lengths, block_id)).solve()
-    found = np.empty((1,) * len(block_id), object)
-    found[(0,) * len(block_id)] = {str(name): one.values for name, one in table.data_vars.items()}
-    return found
-
-
-def _result(chunk: Any, result: str) -> np.ndarray:
-    """One result of a chunk, which is an element of an array or an array of that alone."""
-    results = chunk.item() if isinstance(chunk, np.ndarray) else chunk
-    return np.asarray(results[result])
-
-
-def _cells(sizes: Mapping[str, int]) -> int:
-    return math.prod(sizes.values())
+def _solved(block: xr.Dataset) -> xr.Dataset:
+    """The results of a chunk: `block` has the plan, and the places along each dimension that lie in the chunk."""
+    chunk = {str(dim): slice(int(block[f"along {dim}"][0]), int(block[f"along {dim}"][-1]) + 1) for dim in block.dims}
+    found = block["plan"].item().part(chunk).solve()
+    return found.drop_vars(found.coords)
 
 
 def plan_sweep(
@@ -192,8 +160,8 @@ def plan_sweep(
         dims = grid_inputs.grid_sizes(drive)
         # as a coordinate it takes no more than what it is made of, and on a grid of the two as much as a result
         if any(dims.keys() == set(variable.dims) for variable in drive.values()):
-            values = peak_acceleration(**grid_inputs.aligned(drive, dims))
-            coords = coords | {"amplitude": xr.Variable(tuple(dims), values, known.PARAMETERS["amplitude"])}
+            peak = peak_acceleration(**drive).transpose(*dims)
+            coords = coords | {"amplitude": xr.Variable(tuple(dims), peak.data, known.PARAMETERS["amplitude"])}
 
     tasks = []
     if motion := tuple(name for name in wanted if name in ROWS and name != "newmark_displacement"):
@@ -215,15 +183,16 @@ def plan_sweep(
 def plan_friction_parameters(inputs: grid_inputs.Inputs, *, model: Any = "mendez") -> Plan:
     """Plan of `slipsweep.friction_parameters`; as `plan_sweep`."""
     problem = grid_inputs.check_problem("sine", model, "auto")
-    check_given(inputs.given, ("theta", "mu_s", "amplitude"))
+    check_given(inputs.given, ("theta", "amplitude"))
+    check_friction(inputs.given)
     coords = grid_inputs.checked(inputs.given, problem.model.g)
     names = (*(name for name in known.FRICTION_PARAMETERS if name not in coords), "sliding_mode", "validity")
     task = _friction_task(problem, names, coords)
     attrs = {"title": "Friction parameters", **_SOURCE, **options.MODELS.attributes(problem.model)}
-    return Plan(task.sizes, coords, (task,), names, attrs)
+    return Plan(dict(task.request.sizes), coords, (task,), names, attrs)
 
 
-def check_dimensions(sizes: Mapping[str, int], coords: Variables, results: Collection[str]) -> None:
+def check_dimensions(sizes: Mapping[str, int], coords: engine.Variables, results: Collection[str]) -> None:
     """Refuse dimensions that no dataset can have with what is in it; DataArrays may name any."""
     for dim in sizes:
         if dim in results:
@@ -232,7 +201,7 @@ def check_dimensions(sizes: Mapping[str, int], coords: Variables, results: Colle
             raise InputError(f"{dim}: is a dimension of another parameter: must have values along it")
 
 
-def _drive(inputs: Variables) -> dict[str, xr.Variable]:
+def _drive(inputs: engine.Variables) -> dict[str, xr.Variable]:
     """The inputs that the amplitude of the base depends on."""
     strength = next(name for name in ("displacement_amplitude", *known.STRENGTHS) if name in inputs)
     clocks = {"displacement_amplitude": "frequency", "pgv": "time_scale", "arias_intensity": "time_scale"}
@@ -240,14 +209,12 @@ def _drive(inputs: Variables) -> dict[str, xr.Variable]:
     return {name: inputs[name] for name in names if name in inputs}
 
 
-def _task(solver: Any, problem: grid_inputs.Problem, names: tuple[str, ...], inputs: Variables) -> Task:
+def _task(solver: Any, problem: grid_inputs.Problem, names: tuple[str, ...], inputs: engine.Variables) -> Task:
     """The task of some results, on the dimensions of these inputs."""
-    sizes = grid_inputs.grid_sizes(inputs)
-    arrays = grid_inputs.aligned(inputs, sizes)
-    return Task(solver, tuple(sizes), engine.Request(problem, tuple(sizes.values()), arrays, names))
+    return Task(solver, engine.Request(problem, grid_inputs.grid_sizes(inputs), inputs, names))
 
 
-def _friction_task(problem: grid_inputs.Problem, names: tuple[str, ...], inputs: Variables) -> Task:
+def _friction_task(problem: grid_inputs.Problem, names: tuple[str, ...], inputs: engine.Variables) -> Task:
     """Eqs. 7-11 on the dimensions they depend on."""
     if "yield_coefficient" in inputs and (unknown := [name for name in names if name != "yield_acceleration"]):
         raise InputError(f"variables: {unknown[0]} needs theta and mu_s in place of yield_coefficient")

@@ -166,40 +166,25 @@ def check_whole(name: str, value: Any, least: int, most: int | None = None) -> i
 
 
 def friction_coefficient(phi: Any) -> Any:
-    """Static friction coefficient mu_s = tan phi of a friction angle, degrees: wherever `phi` is an input.
-
-    It lies along the dimensions of a DataArray or Variable, or along the dimension "phi"; but for a Variable it has the
-    angles as its coordinate "phi".  InputError: angles that are not allowed, or dimensions that have no name.
-    """
+    """Static friction coefficient μs = tan φ of friction angles, degrees (InputError: angles that are not allowed)."""
     import numpy as np
-    import xarray as xr
 
-    values = check_values("phi", phi)
-    tangents = np.tan(np.radians(values))
-    if isinstance(phi, xr.Variable):
-        return xr.Variable(phi.dims, tangents)
-    if values.ndim > 1 and not isinstance(phi, xr.DataArray):
-        raise InputError(f"phi: an array of {values.ndim} dimensions; must be a scalar, a 1-D array, or a DataArray")
-    dims = phi.dims if isinstance(phi, xr.DataArray) else ("phi",) * values.ndim
-    coords = dict(phi.coords) if isinstance(phi, xr.DataArray) else {}
-    return xr.DataArray(tangents, coords | {"phi": (dims, values, PARAMETERS["phi"])}, dims)
+    check_values("phi", phi)
+    return np.tan(np.radians(phi))
 
 
-def with_friction_coefficient(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Parameters in which `mu_s` = tan phi stands in place of `phi` (InputError: both are given); None is not given."""
-    given = {name: value for name, value in parameters.items() if name != "phi"}
-    if parameters.get("phi") is None:
-        return given
-    if given.get("mu_s") is not None:
+def check_friction(given: Mapping[str, Any]) -> None:
+    """Refuse static friction that is not given, or given as a coefficient and as an angle; None is not given."""
+    if given.get("phi") is None:
+        check_given(given, ("mu_s",))
+    elif given.get("mu_s") is not None:
         raise InputError("phi, mu_s: must not both be given; mu_s = tan(phi)")
-    return given | {"mu_s": friction_coefficient(parameters["phi"])}
 
 
 def single_friction_coefficient(mu_s: Any, phi: Any) -> float:
     """The friction coefficient of one block, given itself or as the friction angle (InputError: both, or neither)."""
-    given = with_friction_coefficient({"mu_s": mu_s, "phi": phi})
-    check_given(given, ("mu_s",))
-    return check_single("mu_s", given["mu_s"])
+    check_friction({"mu_s": mu_s, "phi": phi})
+    return check_single("mu_s", mu_s if phi is None else friction_coefficient(check_single("phi", phi)))
 
 
 def check_given(given: Mapping[str, Any], names: Collection[str]) -> None:

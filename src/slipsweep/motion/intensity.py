@@ -8,7 +8,7 @@ acceleration but what `baseline` took off when it was read.  "g" is standard gra
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +50,7 @@ def intensity_measures(record: Motion) -> dict[str, float]:
     }
 
 
-def strength_factor(record: Motion, given: Mapping[str, Floats]) -> Floats:
+def strength_factor(record: Motion, given: Mapping[str, Any]) -> Any:
     """What the acceleration of a record is multiplied by, for the strength that is given, and `time_scale`.
 
     The strength is one of `scale`, `amplitude` (m/s²), `pgv` (m/s) and `arias_intensity` (m/s).  The last two grow with

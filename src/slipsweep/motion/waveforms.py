@@ -8,14 +8,11 @@ the first `ramp_in` cycles, and falls to 0 over the last `ramp_out`; A is the pe
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from slipsweep.errors import InputError
 from slipsweep.model.choices import Choice, Family, option
 from slipsweep.model.parameters import MOST_CYCLES, number_text
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 #: Largest multiple of a harmonic.
 MOST_MULTIPLE = 100
@@ -208,7 +205,7 @@ WAVEFORMS: Family[Waveform] = Family(
 )
 
 
-def peak_acceleration(displacement_amplitude: "NDArray[Any]", frequency: "NDArray[Any]") -> "NDArray[Any]":
-    """A = (2πf)² d of a motion of peak displacement d (m), m/s²; the arrays broadcast."""
+def peak_acceleration(displacement_amplitude: Any, frequency: Any) -> Any:
+    """A = (2πf)² d of a motion of peak displacement d (m), m/s², of numbers, arrays or variables."""
     omega = 2.0 * math.pi * frequency
     return omega * omega * displacement_amplitude

@@ -122,7 +122,7 @@ def simulate(
     for name, variable in plan.coords.items():
         if variable.dims:
             raise InputError(f"{name}: simulate takes one case; must be a single number")
-    one = _History(problem, {name: variable.values for name, variable in plan.coords.items()}, plan.solve())
+    one = _History(problem, plan.coords, plan.solve())
     if times is None:
         points = POINTS_PER_CYCLE if points_per_cycle is None else points_per_cycle
         phases = one.points(parameters.check_whole("points_per_cycle", points, 4, parameters.MOST_POINTS))
@@ -147,7 +147,7 @@ class _History:
     Phases are ωt; under a record the times at time scale 1 take their place.
     """
 
-    def __init__(self, problem: grid_inputs.Problem, inputs: Mapping[str, Floats], summary: xr.Dataset) -> None:
+    def __init__(self, problem: grid_inputs.Problem, inputs: Mapping[str, xr.Variable], summary: xr.Dataset) -> None:
         self.problem, self.inputs, self.summary = problem, inputs, summary
         given, motion = engine.cell_inputs(problem, inputs), problem.excitation
         self.cell = Cell(*(float(given.get(name, math.nan)) for name in Cell._fields))
@@ -191,9 +191,9 @@ class _History:
             return {}
         with np.errstate(over="ignore"):
             peak = self.wave.height * self.cell.amplitude
-        given = {**{name: np.atleast_1d(values) for name, values in self.inputs.items()}, "amplitude": peak}
-        request = engine.Request(self.problem, peak.shape, given, ("sliding_mode",))
-        mode = engine.friction_parameters(request)["sliding_mode"]
+        given = {**self.inputs, "amplitude": xr.Variable("half_wave", peak)}
+        request = engine.Request(self.problem, {"half_wave": peak.size}, given, ("sliding_mode",))
+        mode = engine.friction_parameters(request)["sliding_mode"].values
         if self.valueless:
             mode[:] = variables.SlidingMode.MISSING
         first, after = self.wave.interval.T

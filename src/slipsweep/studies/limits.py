@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.grid import engine
-from slipsweep.grid.chunks import slabs
-from slipsweep.grid.engine import Arrays, Request
-from slipsweep.grid.inputs import Inputs
+from slipsweep.grid.chunks import grid_chunks
+from slipsweep.grid.engine import Request, Variables
+from slipsweep.grid.inputs import Inputs, grid_sizes
 from slipsweep.grid.plans import Plan, plan_sweep
 from slipsweep.model import options, parameters, units, variables
 from slipsweep.model.variables import LimitStatus, Validity
@@ -41,6 +41,9 @@ AMPLITUDE_STEPS = 256
 
 #: Cost of a limit in addition to the scan of its block, in cells of the cycle solver.
 _COST = 100.0
+
+#: The dimension of the amplitudes that a scan tries.
+_ALONG = "scanned amplitude"
 
 #: Displacements scanned together: 16 MB, and as much again to compare them.
 SCANNED = 2_000_000
@@ -188,14 +191,14 @@ def plan_limits(
     if maximum_amplitude is None:
         maximum_amplitude = variables.MAXIMUM_AMPLITUDE_IN_G * task.request.problem.model.g
     highest = parameters.check_single("maximum_amplitude", maximum_amplitude)
-    arrays = dict(task.request.arrays)
-    arrays["displacement"] = arrays.pop("amplitude")
-    blocks = np.broadcast_shapes(*(one.shape for name, one in arrays.items() if name not in _AFTER_SCAN))
-    scaled = {dim: size for (dim, size), own in zip(plan.sizes.items(), blocks, strict=True) if own == 1}
+    solved = dict(task.request.inputs)
+    solved["displacement"] = solved.pop("amplitude")
+    blocks = grid_sizes({name: one for name, one in solved.items() if name not in _AFTER_SCAN})
+    scaled = {dim: size for dim, size in plan.sizes.items() if dim not in blocks}
     # in which mode a block slides, or in how many pulses of a record
-    codes = variables.RECORD_COUNTS if "time_scale" in arrays else ("sliding_mode",)
+    codes = variables.RECORD_COUNTS if "time_scale" in solved else ("sliding_mode",)
     names = (*variables.LIMIT_RESULTS, *codes, "validity")
-    request = replace(task.request, arrays=arrays, wanted=names)
+    request = replace(task.request, inputs=solved, wanted=names)
     return Plan(
         plan.sizes,
         {name: one for name, one in plan.coords.items() if name != "amplitude"} | {"displacement": target},
@@ -212,28 +215,27 @@ def plan_limits(
     )
 
 
-def _solve(maximum_amplitude: float, steps: int, request: Request) -> Arrays:
+def _solve(maximum_amplitude: float, steps: int, request: Request) -> Variables:
     """Limit amplitudes of a grid, whose inputs have the `displacement` to be reached in place of the amplitude."""
     results = request.results()
     for where, motion in engine.motions(request):
         # two thresholds of a pulse, and two sides of each, in addition to the steps
         scanned = steps + 4 * _heights(motion).size
-        for slab in slabs(motion.shape, max(1, SCANNED // scanned)):
-            part = motion.part(slab)
+        for chunk in grid_chunks(motion.sizes, max(1, SCANNED // scanned)):
+            part = motion.part(chunk)
             for name, values in _solve_part(part, maximum_amplitude, steps).items():
-                own: Any = results[name][(*where, ...)]  # type: ignore[arg-type]
-                own[(*slab, ...)] = values
-            request.count(math.prod(part.shape))
+                results[name][chunk | where] = values
+            part.count()
     return results
 
 
-def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> Arrays:
+def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> dict[str, NDArray[Any]]:
     """Limit amplitudes of a part of a grid that one motion shakes."""
     scan = Scan(request, maximum_amplitude, steps)
     cell, low, high = _limits(scan)
     wanted = tuple(name for name in request.wanted if not name.startswith("limit_"))
     before, after = scan.solve(low, cell, wanted), scan.solve(high, cell, wanted)
-    results = replace(request, shape=scan.targets.shape).results()
+    results = {name: one.data.ravel() for name, one in request.results().items()}
     for values in results.values():
         values[:] = math.nan if values.dtype.kind == "f" else variables.SlidingMode.MISSING
     # without a limit the validity at the maximum amplitude says why
@@ -251,7 +253,7 @@ def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> Array
         [LimitStatus.AFTER_GAP, LimitStatus.AT_MODE_JUMP, LimitStatus.AT_JUMP],
         LimitStatus.REACHED,
     )
-    return {name: values.reshape(request.shape) for name, values in results.items()}
+    return {name: values.reshape(tuple(request.sizes.values())) for name, values in results.items()}
 
 
 class Steps(NamedTuple):
@@ -266,35 +268,36 @@ class Scan:
     """Cells that one motion shakes, at increasing amplitudes: those of a part of a grid."""
 
     def __init__(self, request: Request, maximum_amplitude: float, steps: int) -> None:
-        self.problem, arrays = request.problem, dict(request.arrays)
-        displacement = arrays.pop("displacement")
+        self.problem, inputs = request.problem, dict(request.inputs)
+        displacement = inputs.pop("displacement")
         amplitudes = _scanned_amplitudes(request, maximum_amplitude, steps)
         # the dimensions of the grid are kept here, as blocks that differ only in their frequency are solved once
-        every = {name: values[..., np.newaxis] for name, values in arrays.items()} | {"amplitude": amplitudes}
-        lengths = np.broadcast_shapes(*(values.shape for values in every.values()))
+        every = inputs | {"amplitude": amplitudes}
         slips = ("number_of_slips",) if isinstance(self.problem.excitation, Record) else ()
         wanted = ("permanent_displacement", "validity", *slips)
-        found = {**engine.solve(Request(self.problem, lengths, every, wanted)), "amplitude": amplitudes}
-        full = (*request.shape, lengths[-1])
+        found = engine.solve(Request(self.problem, grid_sizes(every), every, wanted))
+        full = {**request.sizes, _ALONG: amplitudes.sizes[_ALONG]}
         #: Results and amplitudes, (cell, amplitude).
-        self.found = {name: np.broadcast_to(values, full).reshape(-1, full[-1]) for name, values in found.items()}
+        self.found = {
+            name: one.set_dims(full).values.reshape(-1, full[_ALONG])
+            for name, one in (*found.items(), ("amplitude", amplitudes))
+        }
         self.amplitudes = self.found["amplitude"]
         #: Displacements to be reached, (cell,).
-        self.targets = np.broadcast_to(displacement, request.shape).ravel()
+        self.targets = displacement.set_dims(request.sizes).values.ravel()
         #: Inputs but for the amplitude: one value for each cell, or one for all.
-        self.arrays = {
-            name: (values if values.size == 1 else np.broadcast_to(values, request.shape)).ravel()
-            for name, values in arrays.items()
+        self.inputs = {
+            name: xr.Variable("cell", one.set_dims(request.sizes).values.ravel()) if one.dims else one
+            for name, one in inputs.items()
         }
 
-    def solve(self, amplitude: Floats, cell: Indices, wanted: tuple[str, ...]) -> Arrays:
+    def solve(self, amplitude: Floats, cell: Indices, wanted: tuple[str, ...]) -> dict[str, NDArray[Any]]:
         """Results of some cells, each at its own amplitudes (rows of the array)."""
-        more = (1,) * (amplitude.ndim - 1)
-        arrays = {
-            name: (values if values.size == 1 else values[cell]).reshape(-1, *more)
-            for name, values in self.arrays.items()
-        }
-        return engine.solve(Request(self.problem, amplitude.shape, {**arrays, "amplitude": amplitude}, wanted))
+        dims = ("cell", _ALONG)[: amplitude.ndim]
+        inputs = {name: one[cell] if one.dims else one for name, one in self.inputs.items()}
+        inputs["amplitude"] = xr.Variable(dims, amplitude)
+        found = engine.solve(Request(self.problem, dict(zip(dims, amplitude.shape, strict=True)), inputs, wanted))
+        return {name: one.values for name, one in found.items()}
 
     def reach(self, amplitude: Floats, cell: Indices) -> NDArray[np.bool_]:
         """Whether some cells reach their targets at amplitudes of their own."""
@@ -302,21 +305,21 @@ class Scan:
         return np.asarray(moved >= self.targets[cell].reshape(-1, *(1,) * (amplitude.ndim - 1)))
 
 
-def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) -> Floats:
-    """Amplitudes to try along the last dimension, with both sides of every change of mode.
+def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) -> xr.Variable:
+    """Amplitudes to try, with both sides of every change of mode: along a dimension of their own, the last one.
 
-    The other dimensions are those of the grid, of length 1 where only the target or the time scale varies.
+    The other dimensions are those of the grid along which more than the target and the time scale varies.
     """
     problem = request.problem
-    blocks = {name: values for name, values in request.arrays.items() if name not in _AFTER_SCAN}
-    shape = np.broadcast_shapes(*(values.shape for values in blocks.values()))
+    blocks = {name: one for name, one in request.inputs.items() if name not in _AFTER_SCAN}
+    sizes = {dim: size for dim, size in request.sizes.items() if dim in grid_sizes(blocks)}
     # Newmark's block has no limiting acceleration, and may have no θ and μs that one would follow from
     limited = ("limiting_acceleration",) if not isinstance(problem.model, options.Newmark) else ()
     wanted = ("yield_acceleration", *limited)
-    blocks["amplitude"] = np.zeros((1,) * len(shape))
-    found = engine.friction_parameters(Request(problem, shape, blocks, wanted))
+    blocks["amplitude"] = xr.Variable((), 0.0)
+    found = engine.friction_parameters(Request(problem, sizes, blocks, wanted))
     # a pulse begins to count, or changes its mode, where its own peak passes Üy or Üg,lim, which do not depend on A
-    thresholds = np.stack([found[name].ravel() for name in wanted], axis=1)
+    thresholds = np.stack([found[name].values.ravel() for name in wanted], axis=1)
     yields = thresholds[:, :1]
     # without a yield acceleration there is no value at any amplitude
     start = np.minimum(np.where(yields > 0.0, yields, maximum_amplitude), maximum_amplitude)
@@ -330,7 +333,7 @@ def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) 
         changes = np.hstack([places * (1.0 - _ROUNDING), places * (1.0 + _ROUNDING)])
     within = np.where((changes >= start) & (changes <= maximum_amplitude), changes, maximum_amplitude)
     scanned = np.sort(np.hstack([amplitudes, within[:, (within < maximum_amplitude).any(axis=0)]]), axis=1)
-    return scanned.reshape(*shape, -1)
+    return xr.Variable((*sizes, _ALONG), scanned.reshape(*sizes.values(), -1))
 
 
 def _heights(request: Request) -> Floats:
@@ -338,7 +341,7 @@ def _heights(request: Request) -> Floats:
     motion = request.problem.excitation
     if not isinstance(motion, Record):
         return np.ones(1)
-    heights = wave_of_record(motion, float(request.arrays["polarity"].item())).height / motion.peak
+    heights = wave_of_record(motion, float(request.inputs["polarity"].values.item())).height / motion.peak
     return np.unique(heights)[-_MOST_PULSES:]
 
 
@@ -375,8 +378,8 @@ def _hidden_peaks(scan: Scan, before: NDArray[np.bool_]) -> list[Steps]:
     near = moved >= least * scan.targets[:, np.newaxis]
     cell, step = np.nonzero((near[:, 1:] | near[:, :-1]) & before)
     found = []
-    for (some,) in slabs(cell.shape, SCANNED // parts):
-        own, begin = cell[some], step[some]
+    for chunk in grid_chunks({"cell": cell.size}, SCANNED // parts):
+        own, begin = cell[chunk["cell"]], step[chunk["cell"]]
         amplitudes = np.linspace(scan.amplitudes[own, begin], scan.amplitudes[own, begin + 1], parts + 1, axis=1)
         reaches = scan.reach(amplitudes, own)
         (which,) = np.nonzero(reaches.any(axis=1) & ~reaches[:, 0])

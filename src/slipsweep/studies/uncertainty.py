@@ -20,7 +20,7 @@ from slipsweep.grid import inputs as grid_inputs
 from slipsweep.model import options, parameters, variables
 from slipsweep.motion.waveforms import Waveform
 from slipsweep.studies import datasets
-from slipsweep.studies.sampling import ENDS, SOBOL_MEMORY, Floats, Sampling, Thresholds, sobol_indices
+from slipsweep.studies.sampling import ENDS, SOBOL_MEMORY, Sampling, Thresholds, sobol_indices
 
 TITLE = "Permanent displacement of a rigid block under uncertain inputs"
 
@@ -203,10 +203,8 @@ def plan_samples(
     sampling: Sampling, inputs: grid_inputs.Inputs, *, excitation: Any, model: Any, solver: Any
 ) -> "SamplePlan":
     """Plan of the samples of a grid, drawn and checked; errors as of `slipsweep.sample`."""
-    # friction may be given, or drawn about, by its angle
-    given = ["phi" if name == "mu_s" and inputs.phi is not None else name for name in inputs.given]
     problem = grid_inputs.check_problem(excitation, model, solver)
-    _check_drawn(sampling, given, problem)
+    _check_drawn(sampling, tuple(inputs.given), problem)
     drawn = sampling.distributions
     absolute = [name for name, one in drawn.items() if one.kind == "absolute"]
     plan = plans.plan_sweep(
@@ -316,8 +314,7 @@ class SamplePlan(plans.Plan):
 
     def part(self, chunk: chunks.Chunk) -> "SamplePlan":
         """The plan cut to a chunk of its grid."""
-        coords = {name: one.isel(chunk, missing_dims="ignore") for name, one in self.coords.items()}
-        return SamplePlan(self.sampling, self.problem, coords, self.attrs)
+        return SamplePlan(self.sampling, self.problem, chunks.variables_within(chunk, self.coords), self.attrs)
 
     def template(self) -> xr.Dataset:
         """The statistics with their dimensions and coordinates but no values: zeros that take no memory."""
@@ -368,10 +365,10 @@ class SamplePlan(plans.Plan):
         statically unstable ones, as exceeding every threshold.
         """
         sampling, sizes = self.sampling, {dim: cut.stop - cut.start for dim, cut in chunk.items()}
-        arrays, shape = self._drawn(chunk, sizes)
+        inputs, drawn = self._drawn(chunk, sizes)
         names = ("permanent_displacement", "validity", *(["sliding_mode"] if "mode_share" in self.names else []))
-        solved = engine.solve(engine.Request(self.problem, shape, arrays, names, progress))
-        runs = [solved[name].reshape(math.prod(sizes.values()), -1) for name in names]
+        solved = engine.solve(engine.Request(self.problem, drawn, inputs, names, progress))
+        runs = [solved[name].values.reshape(math.prod(sizes.values()), -1) for name in names]
         # of Sobol indices the first runs are the samples
         displacement, flags, *modes = (values[:, : self.samples] for values in runs)
         clocks = self.frequency.isel(chunk, missing_dims="ignore").set_dims(sizes | self.scaled)
@@ -411,9 +408,9 @@ class SamplePlan(plans.Plan):
             found |= sobol_indices(sampling, runs[0])
         return found
 
-    def _drawn(self, chunk: chunks.Chunk, sizes: dict[str, int]) -> tuple[dict[str, Floats], tuple[int, ...]]:
-        """Inputs of the runs of a chunk, and their shape, (solved, pooled, draw): a sweep with one more dimension."""
-        inputs = {name: one.isel(chunk, missing_dims="ignore") for name, one in self.inputs.items()}
+    def _drawn(self, chunk: chunks.Chunk, sizes: dict[str, int]) -> tuple[dict[str, xr.Variable], dict[str, int]]:
+        """Inputs of the runs of a chunk, and their sizes, (solved, pooled, draw): a sweep with one more dimension."""
+        inputs = chunks.variables_within(chunk, self.inputs)
         sizes = sizes | self.pooled | {_DRAW: self.sampling.runs}
         drawn = {name: xr.Variable((_DRAW,), draws) for name, draws in self.sampling.draws.items()}
         for name, one in self.sampling.distributions.items():
@@ -421,14 +418,12 @@ class SamplePlan(plans.Plan):
                 inputs[name] = one.applied(inputs.get(name), drawn.pop(name))
         if "phi" in inputs:
             inputs["mu_s"] = parameters.friction_coefficient(inputs.pop("phi"))
-        arrays = grid_inputs.aligned(inputs, sizes)
         for name in (one for one in _ESTIMATED if one in drawn):
-            one, draws = self.sampling.distributions[name], grid_inputs.aligned(drawn, sizes)[name]
             # Coulomb's yield acceleration depends on no shaking, which a record has of its own
-            every = {"amplitude": np.zeros((1,) * draws.ndim), **arrays}
-            shape = np.broadcast_shapes(*(values.shape for values in every.values()))
-            request = engine.Request(self.problem, shape, every, (name,))
-            values = one.applied(engine.friction_parameters(request, finite=False)[name], draws)
+            every = {"amplitude": xr.Variable((), 0.0), **inputs}
+            request = engine.Request(self.problem, grid_inputs.grid_sizes(every), every, (name,))
+            estimate = engine.friction_parameters(request, finite=False)[name]
+            values = self.sampling.distributions[name].applied(estimate, drawn[name])
             # NaN leaves it to the estimate and its flag where that fails
-            arrays[name] = np.where(parameters.BOUNDS[name].holds(values), values, np.nan)
-        return arrays, tuple(sizes.values())
+            inputs[name] = values.where(parameters.BOUNDS[name].holds(values))
+        return inputs, sizes
