@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -69,12 +69,7 @@ class Job:
 
     def outline(self, command: str) -> xr.Dataset:
         """As `described`, but with lazy arrays where the results will stand."""
-        import dask.array as da  # takes as long as xarray: only for runs in chunks
-
-        template = self.plan.template()
-        for name, one in template.data_vars.items():
-            template[name] = (one.dims, da.zeros(one.shape, dtype=one.dtype, chunks=-1), one.attrs)
-        return self.described(template, command)
+        return self.described(self.plan.outline({}), command)
 
 
 def sweep_job(spec: SweepSpec) -> Job:
@@ -92,7 +87,7 @@ def limit_job(spec: SweepSpec, displacement: float | list[float], maximum_amplit
             raise InputError("has uncertain inputs; limits are those of a sweep without [uncertainty]")
         plan = plan_limits(
             displacement,
-            spec.inputs.but(dict.fromkeys(("displacement_amplitude", *STRENGTHS))),
+            replace(spec.inputs, **dict.fromkeys(("displacement_amplitude", *STRENGTHS))),
             excitation=spec.excitation,
             model=spec.model,
             maximum_amplitude=maximum_amplitude,

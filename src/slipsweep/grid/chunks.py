@@ -13,9 +13,6 @@ Chunk: TypeAlias = dict[str, slice]
 #: Cells read, solved or written at a time: 80 MB of results, yet enough to keep the kernels busy.
 CHUNK_CELLS = 4_000_000
 
-#: Lengths of the chunks along each dimension of a grid.
-Lengths = Mapping[str, tuple[int, ...]]
-
 
 def chunk_lengths(shape: Mapping[str, int], most: int, together: Collection[str] = ()) -> dict[str, int]:
     """Return the chunk of a grid: at most `most` cells, whole along the last dimensions as far as they allow.

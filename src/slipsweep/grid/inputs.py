@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -72,10 +72,6 @@ class Inputs:
         """The parameters that are given."""
         values = {one.name: getattr(self, one.name) for one in fields(self)}
         return {name: value for name, value in values.items() if value is not None}
-
-    def but(self, others: Mapping[str, Any]) -> "Inputs":
-        """The same with other values of some parameters; None leaves one out."""
-        return replace(self, **others)
 
 
 def check_parameters(problem: Problem, inputs: Inputs) -> dict[str, xr.Variable]:

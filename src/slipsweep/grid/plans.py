@@ -98,23 +98,29 @@ class Plan:
 
         return self._table(zeros)
 
-    def lazy(self, lengths: chunks.Lengths) -> xr.Dataset:
-        """The results as dask arrays in chunks of these lengths: nothing is computed before it is asked for."""
-        import dask.array as da  # takes as long as xarray
+    def outline(self, lengths: Mapping[str, tuple[int, ...]]) -> xr.Dataset:
+        """As `template`, but with lazy arrays, in chunks of these lengths along the dimensions of the grid."""
+        import dask.array as da  # takes as long as xarray: only for what is lazy
 
-        table = self.template()
+        table, zeros = self.template(), {}
+        for name, one in table.data_vars.items():
+            chunked = [lengths.get(str(dim), -1) for dim in one.dims]
+            zeros[name] = da.zeros(one.shape, dtype=one.dtype, chunks=chunked)
+        return table.copy(data=zeros)
+
+    def lazy(self, lengths: Mapping[str, tuple[int, ...]]) -> xr.Dataset:
+        """The results as dask arrays in chunks of these lengths: nothing is computed before it is asked for."""
+        import dask.array as da
+
         if not lengths:  # one cell
             return self.solve().chunk()
-        zeros = {
-            name: da.zeros(one.shape, dtype=one.dtype, chunks=[lengths.get(str(dim), -1) for dim in one.dims])
-            for name, one in table.data_vars.items()
-        }
-        template = table.drop_vars(table.coords).copy(data=zeros)
+        outline = self.outline(lengths)
         blocks = {f"along {dim}": (dim, da.arange(sum(own), chunks=(own,))) for dim, own in lengths.items()}
         # one task of the graph, which all chunks read
         plan = da.from_array(np.array(self, object), name=False)
+        template = outline.drop_vars(outline.coords)
         found = xr.map_blocks(_solved, xr.Dataset(blocks | {"plan": ((), plan)}), template=template)
-        return found.assign_coords(table.coords)
+        return found.assign_coords(outline.coords)
 
     def _table(self, evaluate: Callable[[Task], engine.Variables]) -> xr.Dataset:
         """The results, with `evaluate` giving a task's."""

@@ -43,9 +43,4 @@ def spread(parts: Collection[Part], work: Callable[[Part], None]) -> None:
             work(part)
         return
     with ThreadPoolExecutor(count) as pool:
-        try:
-            for _ in pool.map(work, parts):
-                pass
-        except BaseException:  # Ctrl-C, too: what has not begun does not
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+        list(pool.map(work, parts))  # which cancels what has not begun, at Ctrl-C, too

@@ -185,7 +185,7 @@ def plan_limits(
     target = xr.Variable(dims, values, variables.TOLERABLE_DISPLACEMENT)
     steps = parameters.check_whole("amplitude_steps", amplitude_steps, 2, 1_000_000)
     # displacement and amplitude change places: in the layout of the grid it stands where the amplitude would
-    swapped = inputs.but({"amplitude": xr.Variable(dims, values)})
+    swapped = replace(inputs, amplitude=xr.Variable(dims, values))
     plan = plan_sweep(swapped, excitation=excitation, model=model, variables=["permanent_displacement"])
     task = plan.tasks[0]
     if maximum_amplitude is None:

@@ -8,6 +8,7 @@ they are solved once for all frequencies; under a record the inverse of the time
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -208,7 +209,7 @@ def plan_samples(
     drawn = sampling.distributions
     absolute = [name for name, one in drawn.items() if one.kind == "absolute"]
     plan = plans.plan_sweep(
-        inputs.but(dict.fromkeys(absolute, _ANY)),
+        replace(inputs, **dict.fromkeys(absolute, _ANY)),
         excitation=excitation, model=model, solver=solver, variables=["permanent_displacement"],
     )  # fmt: skip
     dropped = {*absolute, *(["mu_s"] if "phi" in drawn else [])}
