@@ -46,7 +46,7 @@ def test_objects(keyword: str, choice: Choice) -> None:
     for one in declared(type(choice)):
         with pytest.raises(dataclasses.FrozenInstanceError):
             setattr(choice, one.name, one.default)
-    for again in (pickle.loads(pickle.dumps(choice)), eval(repr(choice), vars(slipsweep)), choice.but()):
+    for again in (pickle.loads(pickle.dumps(choice)), eval(repr(choice), vars(slipsweep))):
         assert again == choice
         assert hash(again) == hash(choice)
         assert repr(again) == repr(choice)

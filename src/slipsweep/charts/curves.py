@@ -148,7 +148,7 @@ def _answers(sheet: Sheet, panel: Panel, flags: list[xr.DataArray]) -> dict[str,
     newmark: Look = {"color": "0.35", "linestyle": "-", "marker": "x"}
     options: dict[str, tuple[Model, dict[str, Any], Look]] = {style.NEWMARK: (Newmark(g=panel.g), {}, newmark)}
     for (end, (recoupling, colours)), (decay, (changed, dash)) in itertools.product(_ENDS.items(), _DECAYS.items()):
-        options[f"{decay}, stop by {end}"] = ours.but(recoupling=recoupling), changed, colours | dash
+        options[f"{decay}, stop by {end}"] = replace(ours, recoupling=recoupling), changed, colours | dash
     found = {}
     for text, (model, changed, look) in options.items():
         answer = solved.solve(data, [solved.DISPLACEMENT, "validity"], model, **changed)

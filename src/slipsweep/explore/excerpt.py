@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -227,7 +227,7 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
     depends = {str(dim) for variable in inputs.values() for dim in variable.dims}
     sizes = {dim: size for dim, size in excerpt.sizes.items() if dim in depends}
     cycles = min(motion.cycles, CYCLES)
-    motion, model = motion.but(cycles=cycles), MODELS.from_attributes(table.attrs)
+    motion, model = replace(motion, cycles=cycles), MODELS.from_attributes(table.attrs)
     points = POINTS * cycles + 1
     most = most_bytes // (len(_COLUMNS) * (2 * points + 4))
     # every position of the sliders has some, if they fit

@@ -77,11 +77,11 @@ class Inputs:
 def check_parameters(problem: Problem, inputs: Inputs) -> dict[str, xr.Variable]:
     """The parameters of a sweep, all that it needs and no others, as `checked` has them."""
     motion, given = problem.excitation, inputs.given
+    _refuse_others(motion, given)
+    _check_interface(problem.model, given)
     if isinstance(motion, Waveform):
-        _refuse_others(given, "a waveform", known.WAVEFORM_INPUTS)
         if ("amplitude" in given) == ("displacement_amplitude" in given):
             raise InputError("amplitude, displacement_amplitude: exactly one of them must be given")
-        _check_interface(problem.model, given)
         parameters.check_given(given, ("frequency",))
         found = checked(given, problem.model.g)
         if "displacement_amplitude" in found:  # A grows with both
@@ -89,8 +89,6 @@ def check_parameters(problem: Problem, inputs: Inputs) -> dict[str, xr.Variable]
             key = f"displacement_amplitude = {d:g}: with frequency = {f:g}, A = (2 pi f)^2 d"
             parameters.check_single("amplitude", peak_acceleration(d, f), key)
         return found
-    _refuse_others(given, f"a {type(motion).__name__}", known.RECORD_INPUTS)
-    _check_interface(problem.model, given)
     strengths = [name for name in known.STRENGTHS if name in given]
     if len(strengths) > 1:
         raise InputError(f"{', '.join(strengths[:2])}: must not both be given; either is the strength of the motion")
@@ -113,11 +111,13 @@ def check_parameters(problem: Problem, inputs: Inputs) -> dict[str, xr.Variable]
     return found
 
 
-def _refuse_others(given: Mapping[str, Any], what: str, taken: tuple[str, ...]) -> None:
+def _refuse_others(motion: Waveform | Record | Suite, given: Mapping[str, Any]) -> None:
     """Refuse inputs of another kind of shaking."""
+    is_wave = isinstance(motion, Waveform)
+    what, taken = ("waveform", known.WAVEFORM_INPUTS) if is_wave else (type(motion).__name__, known.RECORD_INPUTS)
     for name in given:
         if name in {*known.WAVEFORM_INPUTS, *known.RECORD_INPUTS} - {*taken}:
-            raise InputError(f"{name}: not allowed with {what}, which takes {', '.join(taken)}")
+            raise InputError(f"{name}: not allowed with a {what}, which takes {', '.join(taken)}")
 
 
 def _check_interface(model: Model, given: Mapping[str, Any]) -> None:
@@ -149,7 +149,7 @@ def _polarity(given: Any) -> xr.Variable:
 def _motion_coordinates(suite: Suite, coords: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:
     """The labels of a suite and its intensity measures: coordinates along `motion`, of pairs also along the azimuth."""
     about = known.MOTION_COORDINATES
-    found = {"motion": xr.Variable("motion", np.array(suite.labels), known.MOTION)}
+    found = {"motion": xr.Variable("motion", np.array(suite.labels), {"long_name": "recorded motion"})}
     found |= {name: xr.Variable("motion", one, about[name]) for name, one in suite.measures.items()}
     if suite.has_pairs:
         both = {"azimuth": coords["azimuth"], "motion": xr.Variable("motion", np.arange(len(suite)))}

@@ -6,9 +6,9 @@ same bits.
 """
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import xarray as xr
@@ -25,20 +25,11 @@ from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform, peak_acceleration
 
-#: What Eqs. 7-11 depend on.
-_FRICTION_INPUTS = (*known.INTERFACE_INPUTS, "yield_coefficient", "amplitude")
-
-_ADVICE = "ask for fewer variables or cells, or give chunks= for a lazy result"
-
 _SOURCE = {"source": f"slipsweep {__version__}", "references": known.REFERENCE}
 
 
-@dataclass(frozen=True)
-class Task:
-    """Results that lie on the same dimensions: what solves them (`engine.solve`, say), and its request."""
-
-    solver: Callable[[engine.Request], engine.Variables]
-    request: engine.Request
+#: Results that lie on the same dimensions: what solves them (`engine.solve`, say), and its request.
+Task: TypeAlias = tuple[Callable[[engine.Request], engine.Variables], engine.Request]
 
 
 @dataclass
@@ -68,7 +59,7 @@ class Plan:
     def part(self, chunk: chunks.Chunk) -> "Plan":
         """The plan of a chunk of the grid, which gives the same bits as the whole does there."""
         sizes, coords = chunks.sizes_within(chunk, self.sizes), chunks.variables_within(chunk, self.coords)
-        tasks = tuple(replace(task, request=task.request.part(chunk)) for task in self.tasks)
+        tasks = tuple((solver, request.part(chunk)) for solver, request in self.tasks)
         return replace(self, sizes=sizes, coords=coords, tasks=tasks)
 
     def solve(self, progress: Callable[[int], None] | None = None) -> xr.Dataset:
@@ -77,26 +68,22 @@ class Plan:
         `progress` is told of cells as they are finished, from any thread.
         """
         check_progress(progress)
-        requests = [task.request for task in self.tasks]
+        requests = [request for _, request in self.tasks]
         cells, grid = max(((one.cells, resources.grid_text(one.sizes)) for one in requests), default=(0, ""))
         itemsizes = (one.cells * sum(dtype.itemsize for dtype in one.dtypes.values()) for one in requests)
         needed = cells * self.cell_memory + sum(itemsizes)
-        resources.check_memory(f"grid of {grid}, {cells:.4g} cells", needed, _ADVICE)
-
-        def solve(task: Task) -> engine.Variables:
-            # all tasks cover the same cells: one of them counts
-            return task.solver(replace(task.request, progress=progress if task is self.tasks[0] else None))
-
-        return self._table(solve)
+        advice = "ask for fewer variables or cells, or give chunks= for a lazy result"
+        resources.check_memory(f"grid of {grid}, {cells:.4g} cells", needed, advice)
+        # all tasks cover the same cells: one of them counts
+        counting = [replace(one, progress=progress if at == 0 else None) for at, one in enumerate(requests)]
+        return self._table([solver(one) for (solver, _), one in zip(self.tasks, counting, strict=True)])
 
     def template(self) -> xr.Dataset:
         """The results with their dimensions and coordinates but no values: zeros that take no memory."""
-
-        def zeros(task: Task) -> engine.Variables:
-            sizes, dtypes = task.request.sizes, task.request.dtypes
-            return {name: xr.Variable((), np.zeros((), dtype)).set_dims(sizes) for name, dtype in dtypes.items()}
-
-        return self._table(zeros)
+        return self._table(
+            {name: xr.Variable((), np.zeros((), dtype)).set_dims(one.sizes) for name, dtype in one.dtypes.items()}
+            for _, one in self.tasks
+        )
 
     def outline(self, lengths: Mapping[str, tuple[int, ...]]) -> xr.Dataset:
         """As `template`, but with lazy arrays, in chunks of these lengths along the dimensions of the grid."""
@@ -122,14 +109,11 @@ class Plan:
         found = xr.map_blocks(_solved, xr.Dataset(blocks | {"plan": ((), plan)}), template=template)
         return found.assign_coords(outline.coords)
 
-    def _table(self, evaluate: Callable[[Task], engine.Variables]) -> xr.Dataset:
-        """The results, with `evaluate` giving a task's."""
-        found = {
-            name: xr.Variable(one.dims, one.data, self.described[name])
-            for task in self.tasks
-            for name, one in evaluate(task).items()
-        }
-        return xr.Dataset({name: found[name] for name in self.names}, self.coords, self.attrs)
+    def _table(self, results: Iterable[engine.Variables]) -> xr.Dataset:
+        """The results of all tasks, described."""
+        found = {name: one for own in results for name, one in own.items()}
+        table = {name: xr.Variable(found[name].dims, found[name].data, self.described[name]) for name in self.names}
+        return xr.Dataset(table, self.coords, self.attrs)
 
 
 def _solved(block: xr.Dataset) -> xr.Dataset:
@@ -181,7 +165,7 @@ def plan_sweep(
         tasks.append(_friction_task(problem, friction, solved))
     if amplitude := tuple(name for name in ("amplitude", "motion_factor") if name in wanted and name not in coords):
         tasks.append(_task(engine.amplitudes, problem, amplitude, drive))
-    names = tuple(name for name in wanted if any(name in task.request.wanted for task in tasks))
+    names = tuple(name for name in wanted if any(name in request.wanted for _, request in tasks))
     attrs = _about(title, problem, coords)
     return Plan(grid_inputs.grid_sizes(solved), coords, tuple(tasks), names, attrs, cost, memory=memory_of(problem))
 
@@ -195,7 +179,7 @@ def plan_friction_parameters(inputs: grid_inputs.Inputs, *, model: Any = "mendez
     names = (*(name for name in known.FRICTION_PARAMETERS if name not in coords), "sliding_mode", "validity")
     task = _friction_task(problem, names, coords)
     attrs = {"title": "Friction parameters", **_SOURCE, **options.MODELS.attributes(problem.model)}
-    return Plan(dict(task.request.sizes), coords, (task,), names, attrs)
+    return Plan(dict(task[1].sizes), coords, (task,), names, attrs)
 
 
 def check_dimensions(sizes: Mapping[str, int], coords: engine.Variables, results: Collection[str]) -> None:
@@ -217,7 +201,7 @@ def _drive(inputs: engine.Variables) -> dict[str, xr.Variable]:
 
 def _task(solver: Any, problem: grid_inputs.Problem, names: tuple[str, ...], inputs: engine.Variables) -> Task:
     """The task of some results, on the dimensions of these inputs."""
-    return Task(solver, engine.Request(problem, grid_inputs.grid_sizes(inputs), inputs, names))
+    return solver, engine.Request(problem, grid_inputs.grid_sizes(inputs), inputs, names)
 
 
 def _friction_task(problem: grid_inputs.Problem, names: tuple[str, ...], inputs: engine.Variables) -> Task:
@@ -229,13 +213,13 @@ def _friction_task(problem: grid_inputs.Problem, names: tuple[str, ...], inputs:
     for name in ("delta_mu", "decay_rate"):
         if name in names and (values == 0.0).any():
             raise InputError(f"{strength} = 0: has no finite {name} (Eqs. 6, 11); must be > 0, or {name} be given")
-    own = {name: one for name, one in inputs.items() if name in (*_FRICTION_INPUTS, *drive)}
-    return _task(engine.friction_parameters, problem, names, own)
+    own = {*known.INTERFACE_INPUTS, "yield_coefficient", "amplitude", *drive}
+    return _task(engine.friction_parameters, problem, names, {name: one for name, one in inputs.items() if name in own})
 
 
 def _about(title: str, problem: grid_inputs.Problem, given: Collection[str]) -> dict[str, Any]:
     """What results say of themselves: the choices read back from it are those of the problem."""
-    inputs = {"friction_inputs": options.friction_inputs(problem.model.name, given)}
+    inputs = {"friction_inputs": options.friction_inputs(problem.model.name, given, {})}
     motion = problem.excitation
     shaking: Mapping[str, Any]
     if isinstance(motion, Record):

@@ -9,7 +9,7 @@ import functools
 import types
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Generic, Literal, Self, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, ClassVar, Generic, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.model import parameters
@@ -76,10 +76,6 @@ class Choice:
         """The options by name, but for those that are None."""
         values = {one.name: getattr(self, one.name) for one in dataclasses.fields(self)}
         return {name: value for name, value in values.items() if value is not None}
-
-    def but(self, **options: Any) -> Self:
-        """The same choice with other options."""
-        return dataclasses.replace(self, **options)
 
 
 def _declared(choice: Any) -> tuple[Option, ...]:

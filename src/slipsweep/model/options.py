@@ -159,13 +159,12 @@ _INPUTS = {
 }
 
 
-def friction_inputs(model: str, given: Collection[str], drawn: Mapping[str, str] | None = None) -> str:
+def friction_inputs(model: str, given: Collection[str], drawn: Mapping[str, str]) -> str:
     """Where Üy, λ and Δμ of a result come from, such as 'Üy, λ given; Δμ by Eqs. 10–11: estimated'.
 
     `drawn` has uncertain parameters, and whether a draw is the value ("absolute") or one about it ("factor", "offset").
     Newmark's block has only Üy.
     """
-    drawn = drawn or {}
     if "yield_coefficient" in drawn or "yield_coefficient" in given:
         return "Üy drawn" if "yield_coefficient" in drawn else "Üy given"
     parts: dict[str, list[str]] = {" given": [], " drawn": [], ": estimated": []}

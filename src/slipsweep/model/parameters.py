@@ -97,8 +97,7 @@ def check_numbers(key: str, values: Any) -> NDArray[np.float64]:
     import numpy as np
 
     array: Any = computed(values)
-    masked = int(np.ma.count_masked(array)) if isinstance(array, np.ma.MaskedArray) else 0
-    if masked:
+    if isinstance(array, np.ma.MaskedArray) and (masked := int(np.ma.count_masked(array))):
         raise InputError(f"{key}: {masked} of {array.size} values are masked: must be numbers, every one of them")
     try:
         array = np.asarray(array)
@@ -113,10 +112,8 @@ def check_numbers(key: str, values: Any) -> NDArray[np.float64]:
 
 def computed(values: Any) -> Any:
     """What lies within a lazy array or one of xarray, masks with it, which `numpy.asarray` would drop."""
-    xarray = sys.modules.get("xarray")  # is loaded if one of its arrays is here
-    if xarray and isinstance(values, (xarray.DataArray, xarray.Variable)):
-        values = values.data
-    dask = sys.modules.get("dask.array")
+    values = getattr(values, "data", values) if hasattr(values, "dims") else values
+    dask = sys.modules.get("dask.array")  # is loaded if one of its arrays is here
     return values.compute() if dask and isinstance(values, dask.Array) else values
 
 

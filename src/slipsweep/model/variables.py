@@ -145,18 +145,15 @@ MAXIMUM_AMPLITUDE_IN_G = 5.0
 
 def _cf(units: str, long_name: str, ancillary: str | None = None, **more: str) -> dict[str, Any]:
     """CF attributes of a variable."""
-    about = {"units": units, "long_name": long_name}
-    return about | ({"ancillary_variables": ancillary} if ancillary else {}) | more
+    return {"units": units, "long_name": long_name} | ({"ancillary_variables": ancillary} if ancillary else {}) | more
 
 
-def _coded(
-    long_name: str, codes: type[IntEnum] | type[IntFlag], ancillary: str | None = None, key: str = "flag_values"
-) -> dict[str, Any]:
+def _coded(long_name: str, codes: Any, ancillary: str | None = None, key: str = "flag_values") -> dict[str, Any]:
     """CF attributes of a variable of codes; one below 0 is that of a missing value."""
     known = [code for code in codes if code >= 0]
-    meanings = " ".join((code.name or "").lower() for code in known)
-    about = {"long_name": long_name, key: [int(code) for code in known], "flag_meanings": meanings}
-    return about | ({"ancillary_variables": ancillary} if ancillary else {})
+    meanings = " ".join(code.name.lower() for code in known)
+    more = {"ancillary_variables": ancillary} if ancillary else {}
+    return {"long_name": long_name, key: [int(code) for code in known], "flag_meanings": meanings} | more
 
 
 #: Which way u is measured.
@@ -271,9 +268,6 @@ MOTION_COORDINATES: dict[str, dict[str, Any]] = {
 
 #: Of them, long texts, that no table repeats in every row: `slipsweep info` and the file itself tell them.
 MOTION_FILES = ("motion_file", "motion_sha256")
-
-#: The labels of a suite, along the dimension of their name.
-MOTION: dict[str, Any] = {"long_name": "recorded motion"}
 
 #: The record itself, in the files of results: what is read back to repeat a run.
 RECORD_SAMPLES: dict[str, dict[str, Any]] = {

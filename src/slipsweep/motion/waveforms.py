@@ -7,7 +7,7 @@ the first `ramp_in` cycles, and falls to 0 over the last `ramp_out`; A is the pe
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
 from slipsweep.errors import InputError
@@ -35,7 +35,7 @@ class Waveform(Choice):
     @property
     def plain(self) -> Self:
         """One cycle of it without ramps."""
-        return self.but(cycles=1, ramp_in=0.0, ramp_out=0.0)
+        return replace(self, cycles=1, ramp_in=0.0, ramp_out=0.0)
 
     def __str__(self) -> str:
         """In words, as a caption has it: ``10 cycles of a triangle wave, ramp in 2 cycles``."""

@@ -187,22 +187,22 @@ def plan_limits(
     # displacement and amplitude change places: in the layout of the grid it stands where the amplitude would
     swapped = replace(inputs, amplitude=xr.Variable(dims, values))
     plan = plan_sweep(swapped, excitation=excitation, model=model, variables=["permanent_displacement"])
-    task = plan.tasks[0]
+    ((_, request),) = plan.tasks
     if maximum_amplitude is None:
-        maximum_amplitude = variables.MAXIMUM_AMPLITUDE_IN_G * task.request.problem.model.g
+        maximum_amplitude = variables.MAXIMUM_AMPLITUDE_IN_G * request.problem.model.g
     highest = parameters.check_single("maximum_amplitude", maximum_amplitude)
-    solved = dict(task.request.inputs)
+    solved = dict(request.inputs)
     solved["displacement"] = solved.pop("amplitude")
     blocks = grid_sizes({name: one for name, one in solved.items() if name not in _AFTER_SCAN})
     scaled = {dim: size for dim, size in plan.sizes.items() if dim not in blocks}
     # in which mode a block slides, or in how many pulses of a record
     codes = variables.RECORD_COUNTS if "time_scale" in solved else ("sliding_mode",)
     names = (*variables.LIMIT_RESULTS, *codes, "validity")
-    request = replace(task.request, inputs=solved, wanted=names)
+    request = replace(request, inputs=solved, wanted=names)
     return Plan(
         plan.sizes,
         {name: one for name, one in plan.coords.items() if name != "amplitude"} | {"displacement": target},
-        (replace(task, solver=partial(_solve, highest, steps), request=request),),
+        ((partial(_solve, highest, steps), request),),
         names,
         {**plan.attrs, "title": TITLE, "maximum_amplitude": highest, "amplitude_steps": steps},
         # one scan of a block serves all its targets
