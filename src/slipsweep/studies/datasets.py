@@ -76,11 +76,9 @@ def sweep(
 ) -> xr.Dataset:
     """Response of a sliding block over a grid of parameters.
 
-    The model is that of Mendez, Romo and Botero [1]_, or Newmark's block.
-
-    A scalar becomes a scalar coordinate, a 1-D array a dimension of the parameter's own name; the grid is the outer
-    product of all of them.  A DataArray keeps its dimensions, so that several on one shared dimension are combined
-    value by value, not crossed.
+    The model is that of Mendez, Romo and Botero [1]_, or Newmark's block.  A scalar becomes a scalar coordinate, a 1-D
+    array a dimension of the parameter's own name; the grid is the outer product of all of them.  A DataArray keeps its
+    dimensions, so that several on one shared dimension are combined value by value, not crossed.
 
     Parameters
     ----------
@@ -247,23 +245,20 @@ def friction_parameters(
 def brought_coordinates(
     inputs: Inputs, coords: Mapping[str, xr.Variable], results: Collection[str]
 ) -> dict[Hashable, xr.Variable]:
-    """Coordinates that the DataArrays among the parameters brought along; they must agree.
-
-    The levels of stacked coordinates come along as coordinates of their own; their tuples, which the levels
-    say again and no file can hold, do not.
-    """
+    """Coordinates that the DataArrays among the parameters brought along; they must agree."""
     brought: dict[Hashable, xr.Variable] = {}
     dims = {dim for variable in coords.values() for dim in variable.dims}
     for parameter, array in inputs.given.items():
         if not isinstance(array, xr.DataArray):
             continue
+        # levels of stacked coordinates come along; their tuples, which no file can hold, do not
         stacked = [dim for dim in array.dims if isinstance(array.xindexes.get(dim), PandasMultiIndex)]
         for name, coordinate in array.reset_index(stacked).coords.items():
             variable = coordinate.variable.to_base_variable()
             known = brought.get(name)
             # a parameter of that name is the coordinate, and labels the dimension of that name
             if name in array.dims and name in coords and name != parameter:
-                known = xr.Variable(coords[str(name)].dims, coords[str(name)].values)
+                known = coords[str(name)]
             if known is not None and not known.equals(variable):
                 raise InputError(f"{parameter}: its coordinate {name!r} differs from that of another parameter")
             if name in results:

@@ -1,8 +1,7 @@
 """Seismic hazard, fragility P(u > d | a), and with both the mean annual rate of exceeding a displacement.
 
-λ(d) = ∫ P(u > d | a) |dν(a)|, where ν(a) is the mean annual rate of peak ground accelerations above a (Cornell 1968).
-ln ν is straight in ln a between the points of the hazard curve, P in ln a between the amplitudes of the grid; the
-integral over these lines is exact.
+λ(d) = ∫ P(u > d | a) |dν(a)|, where ν(a) is the mean annual rate of peak ground accelerations above a (Cornell 1968):
+exact for the straight lines between points that `displacement_hazard` names.
 """
 
 import csv
@@ -99,9 +98,8 @@ def read_hazard_curve(path: str | Path, g: float, site: int | None = None) -> Ha
     """Read a hazard curve of peak ground acceleration from a CSV file; "g" as a unit is `g` m/s², that of the result.
 
     The first line that is not blank and does not begin with ``#`` names the columns: ``PGA (g), annual rate``.
-    Separators are commas, semicolons or tabs.  Columns of other names are left out.  Or a file of OpenQuake,
-    ``hazard_curve-mean-PGA_12.csv``, whose probabilities of exceedance become annual rates, −ln(1 − p)/T with its
-    investigation time T; `site` is which of its sites, from 1, and needed if it has several.
+    Columns of other names are left out.  Or a file of OpenQuake, whose probabilities of exceedance become annual rates,
+    −ln(1 − p)/T with its investigation time T; `site` is which of its sites, from 1, and needed if it has several.
     InputError: the file cannot be read, a column is missing or has no unit, or the numbers are no hazard curve.
     """
     try:
@@ -166,10 +164,9 @@ def _openquake_curve(
 def fragility(result: xr.Dataset, thresholds: Thresholds | None = None, over: Any = None) -> xr.Dataset:
     """Probability of exceeding displacements along `amplitude`, of a suite, of uncertain inputs, or of both.
 
-    `result` is one of `sweep` under a suite, or of `sample`, whose thresholds those wanted must be among.  Motions that
-    were not pooled are equally likely; `over` is as in `suite_statistics`.  The result has `exceedance_probability`
-    (dimensions of the grid, amplitude, threshold) and `valueless_share`.  InputError: there is no dimension `amplitude`
-    of two values or more, no suite and nothing uncertain, or no such threshold.
+    Arguments are those of `displacement_hazard`.  The result has `exceedance_probability` (dimensions of the grid,
+    amplitude, threshold) and `valueless_share`.  InputError: no dimension `amplitude` of two values or more, no suite
+    and nothing uncertain, or no such threshold.
     """
     name = "exceedance_probability" if "exceedance_probability" in result else "permanent_displacement"
     if name in result and result[name].sizes.get("amplitude", 1) < 2:
@@ -182,9 +179,7 @@ def fragility(result: xr.Dataset, thresholds: Thresholds | None = None, over: An
         given = THRESHOLDS if thresholds is None else thresholds
         found = suite_statistics(result, thresholds=given, quantiles=0.5, over=over)[wanted]
     else:
-        found = result[wanted].load()
-        if thresholds is not None:
-            found = at_thresholds(found, thresholds)
+        found = at_thresholds(result[wanted].load(), thresholds)
         dims = suite_dims(found["exceedance_probability"], over) if "motion" in found.dims else ()
         pooled = re.findall(r"\d+ (\w+)", str(result.attrs.get("pooled", "")))  # of "4 motion x 2 polarity"
         found = found.mean(dims, keep_attrs=True).assign_attrs(suite_dimensions=" ".join((*dims, *pooled, "samples")))
@@ -196,9 +191,8 @@ def fragility(result: xr.Dataset, thresholds: Thresholds | None = None, over: An
 def openquake_fragility(found: xr.Dataset) -> str:
     """A fragility as an XML file of OpenQuake (NRML 0.5): a discrete function for each grid point.
 
-    `found` is what `fragility` returns; its thresholds are the limit states.  Peak ground accelerations are in g; to
-    them no probability is extrapolated: the first is the limit of no damage.  InputError: a probability is missing, as
-    the model gives no value there.
+    Thresholds of `found` (`fragility`) are the limit states, amplitudes are in g.  The first is the limit of no damage:
+    nothing is extrapolated to it.  InputError: a probability is missing, as the model gives no value there.
     """
     g = float(found.attrs["g"])
     probability = found["exceedance_probability"].transpose(..., "threshold", "amplitude")
@@ -227,8 +221,8 @@ def openquake_fragility(found: xr.Dataset) -> str:
 def exceedance_rates(curve: HazardCurve, amplitude: Any, probability: Any) -> dict[str, Floats]:
     """Integrate a fragility over a hazard curve: the rates of `displacement_hazard`.
 
-    `probability` has that of exceedance at each `amplitude` along its first dimension; it is straight in ln a between
-    them.  Amplitudes (m/s²) are > 0 and increase, two at least.  InputError: none lies within the curve.
+    `probability` has that of exceedance at each `amplitude` (m/s², > 0, increasing, two at least) along its first
+    dimension.  InputError: no amplitude lies within the curve.
     """
     from scipy.interpolate import make_interp_spline
 
@@ -284,8 +278,7 @@ def displacement_hazard(
     curve : HazardCurve, str or Path
         Or a CSV file with the columns "PGA (g)" and "annual rate", or one of OpenQuake's with one site.
     thresholds : float, str or list of these, optional
-        Increasing displacements, m or with a unit ("50mm"), ≥ 0; by default 0.01, 0.1 and 1 m.  Of a result of
-        `sample` they must be among those that it has, which are the default.
+        In m or with a unit, as in `suite_statistics`; of a result of `sample` some of its own, by default all.
     over : str or list of str, optional
         As in `suite_statistics`.
 
@@ -336,30 +329,21 @@ def displacement_hazard(
         curve = read_hazard_curve(curve, float(result.attrs.get("g", np.nan)))
     found = fragility(result, thresholds, over)
     amplitude = found["amplitude"].values.astype(np.float64)
-    names = [name for name in HAZARD_RESULTS if name != "valueless_share"]
-
-    def rates_of(chances: Floats) -> tuple[Floats, ...]:
-        """The rates of a grid point, (threshold,) each, from its probabilities, (amplitude, threshold)."""
-        there = np.isfinite(chances[:, 0])
-        own = chances[there]
-        if len(own) < 2:
-            return (np.full(chances.shape[1], np.nan),) * len(names)
+    chances = found["exceedance_probability"].variable
+    results = {name: xr.full_like(chances.sum("amplitude"), np.nan) for name in HAZARD_RESULTS}
+    results["valueless_share"] = found["valueless_share"].max("amplitude").variable
+    for point in np.ndindex(chances.shape[:-2]):
+        there = np.isfinite(chances.values[*point, :, 0])
+        own = chances.values[*point, there]
         if len(own) == 2 and (own[0] != own[1]).any():
             raise InputError(
                 "result: amplitude: only two peak ground accelerations have a value, and P(u > d) differs between "
                 "them; how it grows in between is not known: run the sweep with more values on the axis amplitude"
             )
-        rates = exceedance_rates(curve, amplitude[there], own)
-        return tuple(rates[name] for name in names)
-
-    every = xr.apply_ufunc(
-        rates_of, found["exceedance_probability"].variable, vectorize=True,
-        input_core_dims=[["amplitude", "threshold"]], output_core_dims=[["threshold"]] * len(names),
-    )  # fmt: skip
-    results = dict(zip(names, every, strict=True))
+        for name, values in exceedance_rates(curve, amplitude[there], own).items() if len(own) > 1 else ():
+            results[name][point] = values
     if results["annual_rate"].isnull().all():
         raise RunError("no annual rate: the model gives no value under any motion at two amplitudes or more")
-    results["valueless_share"] = found["valueless_share"].max("amplitude").variable
     for name, one in results.items():
         one.attrs = HAZARD_RESULTS[name]
     coords = {name: one.variable for name, one in found.coords.items() if "amplitude" not in (*one.dims, name)}

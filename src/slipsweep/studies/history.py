@@ -26,15 +26,6 @@ from slipsweep.studies import datasets
 
 Floats = NDArray[np.float64]
 
-#: Points a cycle where none are given.
-POINTS_PER_CYCLE = 512
-
-#: Cycles after the shaking that have as many points each as one of the shaking; longer slides have no more points.
-_CYCLES_BEYOND = 100
-
-#: Points after a record at its mean interval; longer slides have no more.
-_POINTS_BEYOND = 20_000
-
 
 @datasets.naming_choices
 def simulate(
@@ -112,29 +103,28 @@ def simulate(
         minimum_friction=minimum_friction, structure_frequency=structure_frequency,
     )  # fmt: skip
     problem = grid_inputs.check_problem(excitation, model, "cycle")
-    if isinstance(problem.excitation, Suite):
-        label = problem.excitation.labels[0]
-        of = ".rotated(azimuth)" if problem.excitation.has_pairs else ""
-        raise InputError(f"excitation: simulate takes one motion of a Suite, such as suite[{label!r}]{of}")
-    if points_per_cycle is not None and isinstance(problem.excitation, Record):
+    motion = problem.excitation
+    if isinstance(motion, Suite):
+        one_motion = f"suite[{motion.labels[0]!r}]{'.rotated(azimuth)' if motion.has_pairs else ''}"
+        raise InputError(f"excitation: simulate takes one motion of a Suite, such as {one_motion}")
+    if points_per_cycle is not None and isinstance(motion, Record):
         raise InputError("points_per_cycle: not allowed with a Record, whose samples are the points; give times")
-    plan = plans.plan_sweep(inputs, excitation=problem.excitation, model=problem.model)
+    plan = plans.plan_sweep(inputs, excitation=motion, model=problem.model)
     for name, variable in plan.coords.items():
         if variable.dims:
             raise InputError(f"{name}: simulate takes one case; must be a single number")
     one = _History(problem, plan.coords, plan.solve())
     if times is None:
-        points = POINTS_PER_CYCLE if points_per_cycle is None else points_per_cycle
+        points = 512 if points_per_cycle is None else points_per_cycle
         phases = one.points(parameters.check_whole("points_per_cycle", points, 4, parameters.MOST_POINTS))
         grid = phases * one.unit
     else:
         grid = np.atleast_1d(parameters.check_numbers("times", times))
-        least = 0.0 if isinstance(problem.excitation, Waveform) else -math.inf
+        least, sign = (0.0, " >= 0") if isinstance(motion, Waveform) else (-math.inf, "")
         with np.errstate(over="ignore"):
             phases = grid / one.unit
         increasing = grid.ndim == 1 and grid.size and (np.diff(grid) > 0.0).all() and grid[0] >= least
         if not increasing or not np.isfinite(phases).all():
-            sign = " >= 0" if least == 0.0 else ""
             raise InputError(f"times: must be one row of finite, increasing numbers{sign}")
     time = xr.Variable(("time",), grid, {"units": "s", "long_name": "time"})
     found = one.summary.assign(one.columns(phases) | one.half_waves()).assign_coords(time=time)
@@ -142,19 +132,17 @@ def simulate(
 
 
 class _History:
-    """One case, its results as a sweep gives them, and its history.
-
-    Phases are ωt; under a record the times at time scale 1 take their place.
-    """
+    """One case, its results as a sweep gives them, and its history; phases are ωt, or a record's times at scale 1."""
 
     def __init__(self, problem: grid_inputs.Problem, inputs: Mapping[str, xr.Variable], summary: xr.Dataset) -> None:
         self.problem, self.inputs, self.summary = problem, inputs, summary
         given, motion = engine.cell_inputs(problem, inputs), problem.excitation
         self.cell = Cell(*(float(given.get(name, math.nan)) for name in Cell._fields))
-        if isinstance(motion, Record):
-            self.wave = cutting.wave_of_record(motion, float(inputs["polarity"]))
+        self.options = solvers.options_of(problem, wants_peak=True)
+        self.record = motion if isinstance(motion, Record) else None
+        if self.record is not None:
+            self.wave = cutting.wave_of_record(self.record, float(inputs["polarity"]))
         else:
-            assert isinstance(motion, Waveform)
             self.wave = cutting.wave_of(motion)
         #: Seconds that a phase takes: 1/ω, or the factor on the time of a record.
         self.unit = float(engine.phase_seconds(problem, inputs))
@@ -162,11 +150,9 @@ class _History:
 
     def sampled(self, phases: Floats) -> Floats:
         """The rows of `HISTORY` at phases, velocity and displacement in units of phase."""
-        is_recorded, table = isinstance(self.problem.excitation, Record), np.empty((len(HISTORY), phases.size))
-        workspace = exact.workspace_of(self.wave, keeps_log=True)
-        chosen = solvers.options_of(self.problem, wants_peak=True)
-        found = kernels.History(*table)
-        _interruptible(kernels.fill_history, self.cell, chosen, self.wave, workspace, is_recorded, phases, found)
+        table, is_record = np.empty((len(HISTORY), phases.size)), self.record is not None
+        shaking = self.wave, exact.workspace_of(self.wave, keeps_log=True), is_record
+        _interruptible(kernels.fill_history, self.cell, self.options, *shaking, phases, kernels.History(*table))
         if self.valueless:  # from the beginning on, also where the flag is raised later
             table[1:] = math.nan
         return table
@@ -186,8 +172,7 @@ class _History:
 
     def half_waves(self) -> dict[str, xr.Variable]:
         """The positive half waves of a record, and the sliding mode of each (`HALF_WAVES`); of a waveform none."""
-        record = self.problem.excitation
-        if not isinstance(record, Record):
+        if self.record is None:
             return {}
         with np.errstate(over="ignore"):
             peak = self.wave.height * self.cell.amplitude
@@ -207,21 +192,20 @@ class _History:
 
     def points(self, points_per_cycle: int) -> Floats:
         """Phases of so many points a cycle, or the samples of a record, and on to the end of the slide."""
-        motion, is_wave = self.problem.excitation, isinstance(self.problem.excitation, Waveform)
-        if isinstance(motion, Record):
-            count, most = motion.times.size, max(_POINTS_BEYOND, motion.times.size)
-            step = float(np.ptp(motion.times)) / (count - 1)
+        # of the shaking, and most of a slide after it
+        if self.record is not None:
+            count, most = self.record.times.size, max(20_000, self.record.times.size)
+            step = float(np.ptp(self.record.times)) / (count - 1)
         else:
-            assert isinstance(motion, Waveform)
-            count, most = points_per_cycle * motion.cycles + 1, _CYCLES_BEYOND * points_per_cycle
+            count, most = points_per_cycle * self.options.cycles + 1, 100 * points_per_cycle
             step = 2.0 * math.pi / points_per_cycle
         # the table, its columns apart, phases and times
         needed = (count + most) * 8 * (2 * len(HISTORY) + 2)
         advice = "take fewer cycles or points_per_cycle, or give times"
         resources.check_memory(f"a history of {count + most:.4g} points", needed, advice)
-        shaken = motion.times if isinstance(motion, Record) else step * np.arange(count, dtype=np.float64)
-        after = 0.0
-        if not self.valueless and not (is_wave and self.summary["sliding_mode"] != variables.SlidingMode.STICK_SLIP):
+        shaken = self.record.times if self.record is not None else step * np.arange(count, dtype=np.float64)
+        after, stick_slip = 0.0, variables.SlidingMode.STICK_SLIP
+        if not self.valueless and self.summary.get("sliding_mode", stick_slip) == stick_slip:
             ground, block, _, velocity, _ = self.sampled(shaken[-1:])[:, 0]
             # after the shaking the block is still braked, by b = Ü - Üg (Eq. 12)
             with np.errstate(divide="ignore", over="ignore"):

@@ -1,18 +1,15 @@
 """The inverse of a sweep: the smallest amplitude at which a tolerable displacement is reached.
 
-The displacement u(A) is no simple function: it jumps where the sliding mode changes, may fall after a jump, and has
-gaps where the model gives no value.  So every block is first scanned from its yield acceleration upwards, including
-both sides of the amplitudes at which its mode changes.  Steps of the scan that may hide a peak are cut into parts, and
-where u jumps or grows beyond all bounds the place is located; docs/limit.md says what is missed all the same.  The
-first step that reaches the target is halved until two neighbouring double-precision numbers are left.  All cells are
-solved together, by the cycle solver.
+Steps of the scan that `limit_amplitude` describes are cut into parts where they may hide a peak, and where u jumps or
+grows beyond all bounds the place is located; docs/limit.md says what is missed all the same.  The first step that
+reaches the target is halved until two neighbouring double-precision numbers are left.  All cells are solved together.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -34,35 +31,19 @@ from slipsweep.studies.datasets import Values
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
+#: Cells, and intervals of amplitude in which they reach their targets: not at the lower end, but at the upper one.
+Steps = tuple[Indices, Floats, Floats]
+
 TITLE = "Amplitudes at which a tolerable displacement is reached"
 
 #: Steps of the scan, in equal ratios from the yield acceleration to the maximum amplitude.
 AMPLITUDE_STEPS = 256
-
-#: Cost of a limit in addition to the scan of its block, in cells of the cycle solver.
-_COST = 100.0
 
 #: The dimension of the amplitudes that a scan tries.
 _ALONG = "scanned amplitude"
 
 #: Displacements scanned together: 16 MB, and as much again to compare them.
 SCANNED = 2_000_000
-
-#: A rise of u between neighbouring amplitudes by more than this part of it is a jump.
-JUMP = 1e-6
-
-#: A maximum of the scan from this part of the target on may lie next to a higher peak.
-_MAXIMUM = 0.9
-
-#: Where the number of slips changes under a record, u jumps: the place is located where u on either side of the step is
-#: at least this part of the target, to this part of the step.
-_SLIPS_LEAST, _SLIPS_PART = 0.25, 1e-5
-
-#: Rounding of the amplitude at which a mode changes by a formula, relative.
-_ROUNDING = 1e-15
-
-#: Pulses of a record whose changes of mode a scan includes: noise has thousands.
-_MOST_PULSES = 128
 
 #: Inputs on which no scan depends: those that only scale its result, or only flag it, and the target.
 _AFTER_SCAN = ("frequency", "time_scale", "structure_frequency", "displacement")
@@ -109,14 +90,11 @@ def limit_amplitude(
     displacement : float, array or DataArray, str or list of str
         Tolerable permanent displacement, > 0, m or with a unit ("50mm").
     theta, mu_s, frequency : float, array or DataArray
-        These and the remaining parameters as in `slipsweep.sweep`; the solver is "cycle".  A record has no frequency,
-        but a `time_scale`.
+        These and the remaining parameters as in `sweep`; the solver is "cycle".  A record has a `time_scale` instead.
     maximum_amplitude : float, optional
         Where the search ends, m/s²; by default 5 g.
     amplitude_steps : int
         Steps of the scan, 2 or more.
-    progress : callable, optional
-        Called with the number of cells just finished.
 
     Returns
     -------
@@ -199,16 +177,15 @@ def plan_limits(
     codes = variables.RECORD_COUNTS if "time_scale" in solved else ("sliding_mode",)
     names = (*variables.LIMIT_RESULTS, *codes, "validity")
     request = replace(request, inputs=solved, wanted=names)
-    return Plan(
-        plan.sizes,
-        {name: one for name, one in plan.coords.items() if name != "amplitude"} | {"displacement": target},
-        ((partial(_solve, highest, steps), request),),
-        names,
-        {**plan.attrs, "title": TITLE, "maximum_amplitude": highest, "amplitude_steps": steps},
-        # one scan of a block serves all its targets
-        cost=plan.cost * (max(1.0, steps / math.prod(scaled.values())) + _COST),
+    return replace(
+        plan,
+        coords={name: one for name, one in plan.coords.items() if name != "amplitude"} | {"displacement": target},
+        tasks=((partial(_solve, highest, steps), request),),
+        names=names,
+        attrs={**plan.attrs, "title": TITLE, "maximum_amplitude": highest, "amplitude_steps": steps},
+        # one scan of a block serves all its targets, each of which takes some 100 cells in addition
+        cost=plan.cost * (max(1.0, steps / math.prod(scaled.values())) + 100.0),
         together=tuple(scaled),
-        memory=plan.memory,
         # inputs laid out over the grid, and transposed copies
         cell_memory=60,
         described=variables.RESULTS | variables.RECORD_COUNTS | variables.LIMIT_RESULTS,
@@ -245,7 +222,7 @@ def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> dict[
     for name, values in {**after, "limit_amplitude": high}.items():
         results[name][cell] = values
     below, above = before["permanent_displacement"], after["permanent_displacement"]
-    jumps = above - below > JUMP * above
+    jumps = above - below > 1e-6 * above
     modes = [name for name in ("sliding_mode", "stick_slip_pulses", "continuous_pulses") if name in after]
     other_mode = np.any([before[name] != after[name] for name in modes], axis=0)
     results["limit_status"][cell] = np.select(
@@ -254,14 +231,6 @@ def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> dict[
         LimitStatus.REACHED,
     )
     return {name: values.reshape(tuple(request.sizes.values())) for name, values in results.items()}
-
-
-class Steps(NamedTuple):
-    """Intervals of amplitude in which cells reach their targets: not at `low`, but at `high`."""
-
-    cell: Indices
-    low: Floats
-    high: Floats
 
 
 class Scan:
@@ -330,62 +299,59 @@ def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) 
     amplitudes = np.maximum.accumulate(np.minimum(amplitudes, maximum_amplitude), axis=1)
     with np.errstate(over="ignore", invalid="ignore"):
         places = (thresholds[:, :, None] / _heights(request)).reshape(len(thresholds), -1)
-        changes = np.hstack([places * (1.0 - _ROUNDING), places * (1.0 + _ROUNDING)])
+        changes = np.hstack([places * (1.0 - 1e-15), places * (1.0 + 1e-15)])  # they are rounded
     within = np.where((changes >= start) & (changes <= maximum_amplitude), changes, maximum_amplitude)
     scanned = np.sort(np.hstack([amplitudes, within[:, (within < maximum_amplitude).any(axis=0)]]), axis=1)
     return xr.Variable((*sizes, _ALONG), scanned.reshape(*sizes.values(), -1))
 
 
 def _heights(request: Request) -> Floats:
-    """Heights of the highest pulses of the motion of a request, in parts of its amplitude, increasing."""
+    """Heights of the 128 highest pulses (noise has thousands), in parts of the motion's amplitude, increasing."""
     motion = request.problem.excitation
     if not isinstance(motion, Record):
         return np.ones(1)
     heights = wave_of_record(motion, float(request.inputs["polarity"].values.item())).height / motion.peak
-    return np.unique(heights)[-_MOST_PULSES:]
+    return np.unique(heights)[-128:]
 
 
 def _limits(scan: Scan) -> Steps:
     """The lowest neighbouring amplitudes between which cells reach their targets, of those cells that do."""
     reaches = scan.found["permanent_displacement"] >= scan.targets[:, np.newaxis]
-    first = np.where(reaches.any(axis=1), reaches.argmax(axis=1), reaches.shape[1])
-    before = np.arange(reaches.shape[1] - 1) < first[:, np.newaxis]
-    (cell,) = np.nonzero(reaches.any(axis=1))
+    reached = np.logical_or.accumulate(reaches, axis=1)
     # the scan begins at yield, where no block has moved: there is always a step before
-    at = first[cell]
-    found = [Steps(cell, scan.amplitudes[cell, at - 1], scan.amplitudes[cell, at]), *_hidden_peaks(scan, before)]
+    before = ~reached[:, :-1]
+    cell, step = np.nonzero(before & reached[:, 1:])
+    found = [(cell, scan.amplitudes[cell, step], scan.amplitudes[cell, step + 1]), *_hidden_peaks(scan, before)]
     # in the gap of the literal rise Kd would be negative: at its edges Kd vanishes, and u grows beyond all bounds
     found.append(_at_change(scan, before, "validity", bits=Validity.KD_NOT_POSITIVE.value))
-    if "number_of_slips" in scan.found:  # under a waveform slips are not counted: such jumps are hidden peaks
-        found.append(_at_change(scan, before, "number_of_slips", least=_SLIPS_LEAST, part=_SLIPS_PART))
-    steps = Steps(*(np.concatenate(values) for values in zip(*found, strict=True)))
-    order = np.argsort(steps.high, kind="stable")
-    cell, at = np.unique(steps.cell[order], return_index=True)
+    if "number_of_slips" in scan.found:  # where it changes, u jumps; under a waveform such jumps are hidden peaks
+        found.append(_at_change(scan, before, "number_of_slips", least=0.25, part=1e-5))
+    cells, low, high = (np.concatenate(values) for values in zip(*found, strict=True))
+    order = np.argsort(high, kind="stable")
+    cell, at = np.unique(cells[order], return_index=True)
     lowest = order[at]
-    return Steps(cell, *_bisected(steps.low[lowest], steps.high[lowest], lambda at, which: scan.reach(at, cell[which])))
+    return cell, *_bisected(low[lowest], high[lowest], lambda at, which: scan.reach(at, cell[which]))
 
 
-def _hidden_peaks(scan: Scan, before: NDArray[np.bool_]) -> list[Steps]:
+def _hidden_peaks(scan: Scan, before: NDArray[np.bool_]) -> Iterator[Steps]:
     """Parts of steps in which a target is reached, `before` (cell, step) the scan itself reaches it."""
     # blocks that do not recouple: u jumps up each time that they come to rest one pulse earlier, and then falls
     saw, parts = (0.7, 128) if isinstance(scan.problem.excitation, Record) else (0.5, 512)
     moved = scan.found["permanent_displacement"]
     slides_on = scan.found["validity"] & Validity.NOT_RECOUPLED.value != 0
-    # the part of a target from which on a point may lie next to a peak
+    # the part of a target from which on a point may lie next to a peak, and a maximum of the scan to a higher one
     least = np.where(slides_on, saw, np.inf)
     peaks = (moved[:, 1:-1] > moved[:, :-2]) & (moved[:, 1:-1] > moved[:, 2:])
-    least[:, 1:-1][peaks & ~slides_on[:, 1:-1]] = _MAXIMUM
+    least[:, 1:-1][peaks & ~slides_on[:, 1:-1]] = 0.9
     near = moved >= least * scan.targets[:, np.newaxis]
     cell, step = np.nonzero((near[:, 1:] | near[:, :-1]) & before)
-    found = []
     for chunk in grid_chunks({"cell": cell.size}, SCANNED // parts):
         own, begin = cell[chunk["cell"]], step[chunk["cell"]]
         amplitudes = np.linspace(scan.amplitudes[own, begin], scan.amplitudes[own, begin + 1], parts + 1, axis=1)
         reaches = scan.reach(amplitudes, own)
         (which,) = np.nonzero(reaches.any(axis=1) & ~reaches[:, 0])
         first = reaches[which].argmax(axis=1)
-        found.append(Steps(own[which], amplitudes[which, first - 1], amplitudes[which, first]))
-    return found
+        yield own[which], amplitudes[which, first - 1], amplitudes[which, first]
 
 
 def _at_change(
@@ -410,7 +376,7 @@ def _at_change(
     low, high = _bisected(start, end, changed, part * (end - start))
     at_low = scan.reach(low, cell)
     found = at_low | scan.reach(high, cell)
-    return Steps(cell[found], np.where(at_low, start, low)[found], np.where(at_low, low, high)[found])
+    return cell[found], np.where(at_low, start, low)[found], np.where(at_low, low, high)[found]
 
 
 def _bisected(

@@ -1,9 +1,8 @@
 """What is drawn: distributions of scipy.stats, quasi-random numbers of scipy.stats.qmc, and Sobol indices of the draws.
 
-Sobol indices say which uncertain input moves the displacement.  They take two independent sets of draws, A and B, and
-for each of k inputs a third set: A, but with this input from B.  That is k + 2 runs for each sample, of which A has the
-samples of all other statistics.  With means over the samples, and V the variance of A and B, the indices of an input
-are
+Sobol indices take two independent sets of draws, A and B, and for each of k inputs a third set: A, but with this input
+from B.  That is k + 2 runs for each sample, of which A has the samples of all other statistics.  With means over the
+samples, and V the variance of A and B, the indices of an input are
 
     first order   mean(u_B (u_AB − u_A)) / V          total   mean((u_A − u_AB)²) / (2 V)
 
@@ -14,7 +13,6 @@ estimators, but its bootstrap takes no seed, so that a run could not be repeated
 import functools
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -32,17 +30,8 @@ Floats = NDArray[np.float64]
 #: What a caller may give as displacements: m, or with a unit.
 Thresholds = float | str | Sequence[float | str] | np.ndarray
 
-KINDS = ("absolute", "factor", "offset")
-METHODS = ("sobol", "latin_hypercube", "random")
-
 #: Most samples a grid point: 2**24 take about 1.5 GB.
 MOST_SAMPLES = 2**24
-
-#: Attributes hold 32 bits.
-_MOST_SEED = 2**31 - 1
-
-#: Distributions that errors name.
-_USUAL = "norm, lognorm, uniform, triang, truncnorm, beta, gamma, weibull_min"
 
 #: Half of the last digit of scipy's Sobol numbers, some of which are 0: the quantile there may be infinite.
 _LEAST = 2.0**-31
@@ -57,18 +46,55 @@ _PARTS = 1024
 #: Bytes that the bootstrap of a grid point takes.
 SOBOL_MEMORY = 8 * RESAMPLES * _PARTS
 
-#: Displacements that differ by less, relative to the largest, differ by rounding.
-_SAME = 1e-12
 
-
-@dataclass(frozen=True)
 class Distribution:
-    """What an uncertain parameter is drawn from."""
+    """What an uncertain parameter is drawn from: an entry of `uncertain`, called `key` in errors."""
 
-    kind: str  # whether a draw is the value ("absolute"), multiplies the grid point's, or is added to it
-    frozen: Any  # a frozen distribution of scipy.stats, or anything else with a ``ppf``
-    unit: float  # what to multiply draws by, to have them in the parameter's own unit
-    about: dict[str, Any]  # the distribution in words and numbers, as it was given
+    def __init__(self, key: str, parameter: str, given: Any, g: float) -> None:
+        from scipy import stats
+
+        entries = dict(given) if isinstance(given, Mapping) else {"distribution": given}
+        chosen = entries.pop("distribution", None)
+        #: Whether a draw is the value ("absolute"), multiplies the grid point's, or is added to it.
+        self.kind = check_choice(f"{key}.kind", entries.pop("kind", "absolute"), ("absolute", "factor", "offset"))
+        units, own = entries.pop("units", None), PARAMETERS[parameter]["units"]
+        if units is not None and (self.kind == "factor" or not isinstance(units, str)):
+            raise InputError(
+                f"{key}.units = {shown(units)}: not allowed with kind = 'factor', else a unit that converts to {own}"
+            )
+        #: A frozen distribution of scipy.stats, or anything else with a ``ppf``.
+        self.frozen = chosen
+        if isinstance(chosen, str):
+            family = getattr(stats, chosen, None)
+            if not isinstance(family, stats.rv_continuous):
+                raise InputError(
+                    f'{key}.distribution = "{chosen}": must be a continuous one of scipy.stats, such as norm, lognorm, '
+                    "uniform, triang, truncnorm, beta, gamma, weibull_min"
+                )
+            allowed = _arguments(family)
+            if not {*allowed[:-2]} <= {*entries} <= {*allowed}:
+                raise InputError(
+                    f"{key}: has {', '.join(map(str, entries)) or 'no parameters'}: {chosen} takes "
+                    f"{', '.join(allowed)}, of which loc and scale may be left out (and the keys kind and units)"
+                )
+            self.frozen = family(**{name: check_finite(f"{key}.{name}", value) for name, value in entries.items()})
+        elif entries or not callable(getattr(chosen, "ppf", None)):
+            raise InputError(
+                f"{key}.distribution = {shown(chosen)}: must be the name of a distribution of scipy.stats, with its "
+                "parameters, or a frozen one without"
+            )
+        #: The distribution in words and numbers, as it was given.
+        self.about: dict[str, Any] = {"distribution": repr(self.frozen)}
+        if family := getattr(self.frozen, "dist", None):
+            numbers = dict(zip(_arguments(family), self.frozen.args, strict=False)) | self.frozen.kwds
+            self.about = {"distribution": family.name, **{name: float(value) for name, value in numbers.items()}}
+        with np.errstate(all="ignore"):
+            median = parameters.check_numbers(f"{key}: its median", self.frozen.ppf(0.5))
+        if median.ndim or not np.isfinite(median):
+            raise InputError(f"{key}: parameters that scipy.stats does not allow for one distribution: {self.about}")
+        #: What to multiply draws by, to have them in the parameter's own unit.
+        self.unit = conversion(f"{key}.units", own, units, g)
+        self.about |= {"units": units, "kind": self.kind} if units is not None else {"kind": self.kind}
 
     def __str__(self) -> str:
         numbers = [f"{name}={value}" for name, value in self.about.items() if name not in ("distribution", "kind")]
@@ -113,15 +139,15 @@ class Sampling:
 
         self.keys = keys
         if not isinstance(uncertain, Mapping) or not uncertain:
-            key, known = self.key("").removesuffix("."), ", ".join(DRAWN)
-            raise InputError(f"{key}: must give the distribution of one parameter at least: {known}")
+            known = f"must give the distribution of one parameter at least: {', '.join(DRAWN)}"
+            raise InputError(f"{self.key('').removesuffix('.')}: {known}")
         for name in uncertain:
             if name not in DRAWN:
                 raise InputError(f"{self.key(name)}: cannot be drawn; {did_you_mean(str(name), DRAWN)}")
         # in one order, whatever that of the caller: the draws are then the same
         names = [name for name in DRAWN if name in uncertain]
-        self.distributions = {name: _distribution(self.key(name), name, uncertain[name], g) for name in names}
-        self.method = check_choice(f"{keys}method", method, METHODS)
+        self.distributions = {name: Distribution(self.key(name), name, uncertain[name], g) for name in names}
+        self.method = check_choice(f"{keys}method", method, ("sobol", "latin_hypercube", "random"))
         self.samples = check_whole(f"{keys}samples", samples, 2, MOST_SAMPLES)
         if method == "sobol" and self.samples & (self.samples - 1):
             below = 1 << (self.samples.bit_length() - 1)
@@ -136,14 +162,14 @@ class Sampling:
         if pooled and sensitivity:
             raise InputError(f"{keys}sensitivity = true: not allowed with {keys}over: indices are of drawn inputs only")
         self.over = tuple(map(str, pooled))
-        self.seed = check_whole(f"{keys}seed", seed, 0, _MOST_SEED)
+        self.seed = check_whole(f"{keys}seed", seed, 0, 2**31 - 1)  # attributes hold 32 bits
         self.quantiles = check_increasing(f"{keys}quantiles", quantiles, "quantile")
         self.thresholds = check_thresholds(f"{keys}thresholds", thresholds, g)
         self.correlation = _pairs(f"{keys}correlation", correlation, names)
         #: Correlations of the normal scores of all parameters.
         self.matrix = np.eye(len(names))
-        for first, second, value in self.correlation:
-            i, j = names.index(first), names.index(second)
+        for *pair, value in self.correlation:
+            i, j = map(names.index, pair)
             self.matrix[i, j] = self.matrix[j, i] = value
         if np.linalg.eigvalsh(self.matrix).min() < 1e-12:
             raise InputError(f"{keys}correlation: no such correlations exist together (their matrix is not positive)")
@@ -153,8 +179,8 @@ class Sampling:
         #: Runs of a grid point: the samples, or all that its Sobol indices take.
         self.runs = self.samples * (number + 2 if sensitivity else 1)
         if self.runs > MOST_SAMPLES:
-            taken = f"Sobol indices take {self.runs} runs a grid point with these"
-            raise InputError(f"{keys}samples = {self.samples}: {taken}; must be {MOST_SAMPLES} at most")
+            taken = f"Sobol indices take {self.runs} runs a grid point with these; must be {MOST_SAMPLES} at most"
+            raise InputError(f"{keys}samples = {self.samples}: {taken}")
 
     def key(self, parameter: Any) -> str:
         """What a distribution is called in errors."""
@@ -219,51 +245,6 @@ class Sampling:
         return found
 
 
-def _distribution(key: str, parameter: str, given: Any, g: float) -> Distribution:
-    """One entry of `uncertain`, called `key` in errors."""
-    from scipy import stats
-
-    entries = dict(given) if isinstance(given, Mapping) else {"distribution": given}
-    chosen = entries.pop("distribution", None)
-    kind = check_choice(f"{key}.kind", entries.pop("kind", "absolute"), KINDS)
-    units, own = entries.pop("units", None), PARAMETERS[parameter]["units"]
-    if units is not None and (kind == "factor" or not isinstance(units, str)):
-        raise InputError(
-            f"{key}.units = {shown(units)}: not allowed with kind = 'factor', else a unit that converts to {own}"
-        )
-    if isinstance(chosen, str):
-        family = getattr(stats, chosen, None)
-        if not isinstance(family, stats.rv_continuous):
-            raise InputError(
-                f'{key}.distribution = "{chosen}": must be a continuous one of scipy.stats, such as {_USUAL}'
-            )
-        allowed = _arguments(family)
-        if not {*allowed[:-2]} <= {*entries} <= {*allowed}:
-            raise InputError(
-                f"{key}: has {', '.join(map(str, entries)) or 'no parameters'}: {chosen} takes {', '.join(allowed)}, "
-                "of which loc and scale may be left out (and the keys kind and units)"
-            )
-        frozen = family(**{name: check_finite(f"{key}.{name}", value) for name, value in entries.items()})
-    elif callable(getattr(chosen, "ppf", None)) and not entries:
-        frozen = chosen
-    else:
-        raise InputError(
-            f"{key}.distribution = {shown(chosen)}: must be the name of a distribution of scipy.stats, with its "
-            "parameters, or a frozen one without"
-        )
-    about: dict[str, Any] = {"distribution": repr(frozen)}
-    if family := getattr(frozen, "dist", None):
-        numbers = dict(zip(_arguments(family), frozen.args, strict=False)) | frozen.kwds
-        about = {"distribution": family.name, **{name: float(value) for name, value in numbers.items()}}
-    with np.errstate(all="ignore"):
-        median = parameters.check_numbers(f"{key}: its median", frozen.ppf(0.5))
-    if median.ndim or not np.isfinite(median):
-        raise InputError(f"{key}: parameters that scipy.stats does not allow for one distribution: {about}")
-    factor = conversion(f"{key}.units", own, units, g)
-    about |= {"units": units, "kind": kind} if units is not None else {"kind": kind}
-    return Distribution(kind, frozen, factor, about)
-
-
 def _arguments(family: Any) -> tuple[str, ...]:
     """Names of a distribution's parameters: its shapes, and those that all have."""
     return (*(family.shapes or "").replace(",", " ").split(), "loc", "scale")
@@ -324,7 +305,7 @@ def _of_point(runs: Floats, seed: int) -> tuple[SensitivityStatus, Floats]:
     none = np.full((3, 2, inputs), np.nan)
     if np.isnan(largest):
         return SensitivityStatus.RUNS_WITHOUT_VALUE, none
-    if np.ptp(runs[:2]) <= _SAME * largest:
+    if np.ptp(runs[:2]) <= 1e-12 * largest:  # they differ by rounding
         return SensitivityStatus.NO_VARIANCE, none
     scaled = runs / largest  # squares of no displacement are then too large or too small
     a, b, *mixed = scaled - scaled[:2].mean()

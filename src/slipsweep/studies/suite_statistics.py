@@ -22,9 +22,6 @@ SUITE = ("motion", "polarity")
 #: Flags under which a motion has no value.
 REASONS = tuple(flag for flag in Validity if flag in VALUELESS)
 
-#: Displacements below it are the rounding of zero, m: a block at yield moves 1e-48.
-_ROUNDING = 1e-12
-
 #: The median, and one standard deviation of a normal distribution on either side of it.
 QUANTILES = (0.16, 0.5, 0.84)
 
@@ -102,36 +99,34 @@ def suite_statistics(
             raise InputError(f"result: {name}: missing: must be there, of all motions")
     dims, g = suite_dims(result["permanent_displacement"], over), float(result.attrs.get("g", np.nan))
     limits, wanted = check_thresholds("thresholds", thresholds, g), check_increasing("quantiles", quantiles, "quantile")
-    least = check_thresholds("zero", zero, g)
-    if least.size > 1:
+    least, *others = check_thresholds("zero", zero, g)
+    if others:
         raise InputError(f"zero = {shown(zero)}: must be one displacement")
 
     moved = without_rounding(result["permanent_displacement"].astype(np.float64).load())
     # a reader may have made codes to numbers with NaN
     codes = result["validity"].fillna(0).astype(np.int16).load()
     there, total = moved.notnull(), int(np.prod([moved.sizes[dim] for dim in dims]))
-    bits = np.array(REASONS, np.int16)
-    about = {"flag_values": bits.tolist(), "flag_meanings": " ".join((flag.name or "").lower() for flag in REASONS)}
-    flag = xr.Variable("flag", bits, {**STATISTIC_COORDINATES["flag"], **about})
-    threshold = xr.Variable("threshold", limits, STATISTIC_COORDINATES["threshold"])
-    quantile = xr.Variable("quantile", wanted, STATISTIC_COORDINATES["quantile"])
+    places = {"flag": np.array(REASONS, np.int16), "threshold": limits, "quantile": wanted}
+    own = {dim: xr.Variable(dim, values, STATISTIC_COORDINATES[dim]) for dim, values in places.items()}
+    meanings = " ".join((flag.name or "").lower() for flag in REASONS)
+    own["flag"].attrs |= {"flag_values": [*map(int, REASONS)], "flag_meanings": meanings}
     count = there.sum(dims)
-    slid = moved.where(moved > least[0])
+    slid = moved.where(moved > least)
     logs: xr.DataArray = np.log(slid)  # type: ignore[assignment]
     found = {
         "value_count": count.astype(np.int32),
         "valueless_count": (total - count).astype(np.int32),
-        "valueless_flag_count": (~there & (codes & flag != 0)).sum(dims).astype(np.int32),
+        "valueless_flag_count": (~there & (codes & own["flag"] != 0)).sum(dims).astype(np.int32),
         "valueless_share": (total - count) / total,
-        "zero_probability": (moved <= least[0]).where(there).mean(dims),
+        "zero_probability": (moved <= least).where(there).mean(dims),
         "nonzero_median": slid.median(dims),
         "nonzero_geometric_mean": np.exp(logs.mean(dims)),
         "log_standard_deviation": logs.std(dims, ddof=1).where(slid.count(dims) > 1),
         "displacement_quantile": _quantiles(moved, wanted, dims),
-        "exceedance_probability": (moved > threshold).where(there).mean(dims),
+        "exceedance_probability": (moved > own["threshold"]).where(there).mean(dims),
     }
-    own = {"flag": flag, "threshold": threshold, "quantile": quantile}
-    attrs = {**result.attrs, "title": TITLE, "suite_dimensions": " ".join(dims), "zero_displacement": float(least[0])}
+    attrs = {**result.attrs, "title": TITLE, "suite_dimensions": " ".join(dims), "zero_displacement": float(least)}
     grid = [dim for dim in moved.dims if dim not in dims]
     laid = {name: one.transpose(*grid, ...) for name, one in found.items()}
     variables = {name: (one.dims, one.values, SUITE_STATISTICS[name]) for name, one in laid.items()}
@@ -140,8 +135,8 @@ def suite_statistics(
 
 
 def without_rounding(displacements: xr.DataArray) -> xr.DataArray:
-    """Displacements, those that are the rounding of zero as zero."""
-    return displacements.where(~(abs(displacements) < _ROUNDING), 0.0)
+    """Displacements, m, those that are the rounding of zero as zero: a block at yield moves 1e-48."""
+    return displacements.where(~(abs(displacements) < 1e-12), 0.0)
 
 
 def _quantiles(values: xr.DataArray, quantiles: np.ndarray, dims: Sequence[str]) -> xr.DataArray:
@@ -174,35 +169,24 @@ def suite_dims(values: xr.DataArray, over: Any = None) -> tuple[str, ...]:
 def limit_quantiles(limits: xr.Dataset) -> xr.Dataset:
     """`QUANTILES` of the limit amplitudes of a suite's motions, at every other grid point: `limit_amplitude`'s result.
 
-    A motion that does not reach the displacement up to the maximum amplitude has a limit above all others: a
-    `limit_quantile` (m/s²) is infinite where too many do not.  Those without a value are left out of it, and of
-    `value_count`; `not_reached_count` has those above all others.
+    A motion that does not reach the displacement has a limit above all others, and is of `not_reached_count`: a
+    `limit_quantile` (m/s²) is infinite where too many do not.  Those without a value are left out of it.
     """
     dims = suite_dims(limits["limit_amplitude"])
     beyond = limits["limit_status"] == LimitStatus.NOT_REACHED
     # so large that whatever is interpolated towards it is above all limits
-    largest = np.finfo(np.float64).max / 4.0
-    values = limits["limit_amplitude"].where(~beyond, largest)
-    quantiles = np.array(QUANTILES)
-    found = _quantiles(values, quantiles, dims)
-    highest = values.where(~beyond).max()
-    return xr.Dataset(
-        {
-            "limit_quantile": found.where(~(found > highest), np.inf).assign_attrs(units="m s-2"),
-            "value_count": values.count(dims),
-            "not_reached_count": beyond.sum(dims),
-        },
-        {"quantile": quantiles},
-        limits.attrs,
-    )
+    values = limits["limit_amplitude"].where(~beyond, np.finfo(np.float64).max / 4.0)
+    found = _quantiles(values, np.array(QUANTILES), dims)
+    quantile = found.where(~(found > values.where(~beyond).max()), np.inf).assign_attrs(units="m s-2")
+    counts = {"value_count": values.count(dims), "not_reached_count": beyond.sum(dims)}
+    return xr.Dataset({"limit_quantile": quantile, **counts}, {"quantile": [*QUANTILES]}, limits.attrs)
 
 
 def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100) -> list[str]:
     """What a designer asks first of a suite, a line for each grid point: median, 16 and 84 %, share of zeros, P(u > d).
 
-    `result` is one of `sweep` with the dimension `motion`, or of `sample`, whose lines are without the share of zeros.
-    Displacements d have a unit or are in m; of `sample` they are among its thresholds.  Of more grid points than `most`
-    there is one line, that says how to have those of some.
+    `result` is one of `sweep` with the dimension `motion`, or of `sample`, whose lines are without the share of zeros,
+    and displacements d among its thresholds.  Of more grid points than `most` there is one line: how to have some.
     """
     import pandas as pd
 
@@ -219,7 +203,7 @@ def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100)
     if is_sampled:
         missing = result["valueless_share"].broadcast_like(moved.isel(quantile=0, drop=True))
         found = result[["displacement_quantile", "exceedance_probability"]].assign(valueless_share=missing)
-        found = (found if displacement is None else at_thresholds(found, displacement)).transpose(*grid, ...).load()
+        found = at_thresholds(found, displacement).transpose(*grid, ...).load()
     else:
         found = suite_statistics(result, thresholds=0.0 if displacement is None else displacement)
     varying = [dim for dim, size in grid.items() if size > 1]
@@ -232,23 +216,26 @@ def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100)
         title = str(dim) if units == "1" else f"{dim} ({units})"
         columns[{"amplitude": "PGA (g)", "yield_coefficient": "ky"}.get(str(dim), title)] = texts
     rows = {name: values.values.reshape(points, -1).T for name, values in found.data_vars.items()}
+
+    def show(title: str, column: np.ndarray, as_text: str) -> None:
+        columns[title] = ["none" if np.isnan(one) else format(one, as_text) for one in column]
+
     for share, column in zip(found["quantile"].values, rows["displacement_quantile"], strict=True):
-        title = "median" if share == 0.5 else f"{100.0 * share:.3g} %"
-        columns[title] = ["none" if np.isnan(one) else f"{one * 1000.0:.3g}" for one in column]
-    shares = {} if is_sampled else {"zero": rows["zero_probability"][0]}
+        show("median" if share == 0.5 else f"{100.0 * share:.3g} %", column * 1000.0, ".3g")
+    if not is_sampled:
+        show("zero", rows["zero_probability"][0], ".1%")
     if displacement is not None or is_sampled:
         for d, column in zip(found["threshold"].values, rows["exceedance_probability"], strict=True):
-            shares[f"P(u > {d * 1000.0:.6g} mm)"] = column
+            show(f"P(u > {d * 1000.0:.6g} mm)", column, ".1%")
     if (rows["valueless_share"] > 0.0).any():
-        shares["no value"] = rows["valueless_share"][0]
-    columns |= {
-        title: ["none" if np.isnan(one) else f"{one:.1%}" for one in column] for title, column in shares.items()
-    }
+        show("no value", rows["valueless_share"][0], ".1%")
     return [f"permanent displacement (mm) over {suite}:", *pd.DataFrame(columns).to_string(index=False).splitlines()]
 
 
-def at_thresholds(found: xr.Dataset, thresholds: Thresholds) -> xr.Dataset:
-    """What `sample` has stored, at some of its thresholds (InputError: not among them)."""
+def at_thresholds(found: xr.Dataset, thresholds: Thresholds | None) -> xr.Dataset:
+    """What `sample` has stored, at some of its thresholds (InputError: not among them), or at all."""
+    if thresholds is None:
+        return found
     wanted = check_thresholds("thresholds", thresholds, float(found.attrs.get("g", np.nan)))
     nearest = found.sel(threshold=wanted, method="nearest")
     for one in wanted[~np.isclose(nearest["threshold"], wanted, rtol=1e-6)][:1]:

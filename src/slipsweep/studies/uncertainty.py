@@ -1,9 +1,8 @@
 """Uncertain inputs: samples of a sweep's parameters, and the statistics of the displacement at every grid point.
 
 Parameters are drawn once (`sampling`), and the same draws serve every grid point: curves over an axis are then as
-smooth as the model, and differences between grid points are not blurred by sampling.  A draw is the parameter itself, a
-factor on its value at the grid point, or an offset to it.  u = W/ω²: where the samples do not depend on the frequency
-they are solved once for all frequencies; under a record the inverse of the time scale takes its place.
+smooth as the model, and differences between grid points are not blurred by sampling.  u = W/ω²: where the samples do
+not depend on the frequency (under a record 1 / time scale) they are solved once for all frequencies.
 """
 
 import math
@@ -53,15 +52,6 @@ _ESTIMATED = ("yield_acceleration", "minimum_friction", "delta_mu", "decay_rate"
 
 #: Names that no dimension and no coordinate of a caller's may have.
 _TAKEN = {*variables.STATISTICS, *variables.STATISTIC_COORDINATES}
-
-#: A value that every parameter may have: the grid of those that are drawn is planned with it.
-_ANY = 0.5
-
-#: Samples solved together: 30 MB, yet enough to keep the kernels busy.
-_CELLS = 1_000_000
-
-#: Cost of the Sobol indices of a grid point in addition to its runs, in cells of the cycle solver.
-_SOBOL_COST = 30_000
 
 #: The dimension of the draws; no result has it.
 _DRAW = "draw of the uncertain inputs"
@@ -124,10 +114,8 @@ def sample(
         Scrambled Sobol sequence, Latin hypercube (scipy.stats.qmc) or pseudo-random numbers.
     seed : int
         The same seed gives the same draws.
-    quantiles : float or array
-        Increasing, between 0 and 1.
-    thresholds : float, str or list of these
-        Increasing displacements, m or with a unit ("50mm"), ≥ 0.
+    quantiles, thresholds : float, str or list of these
+        Increasing, as in `suite_statistics`: shares, and displacements in m or with a unit ("50mm").
     correlation : list of (str, str, float)
         Pairs of drawn parameters and the correlation of their normal scores (a Gaussian copula).
     sensitivity : bool
@@ -208,10 +196,9 @@ def plan_samples(
     _check_drawn(sampling, tuple(inputs.given), problem)
     drawn = sampling.distributions
     absolute = [name for name, one in drawn.items() if one.kind == "absolute"]
-    plan = plans.plan_sweep(
-        replace(inputs, **dict.fromkeys(absolute, _ANY)),
-        excitation=excitation, model=model, solver=solver, variables=["permanent_displacement"],
-    )  # fmt: skip
+    # 0.5: a value that every parameter may have
+    planned, wanted = replace(inputs, **dict.fromkeys(absolute, 0.5)), ["permanent_displacement"]
+    plan = plans.plan_sweep(planned, excitation=excitation, model=model, solver=solver, variables=wanted)
     dropped = {*absolute, *(["mu_s"] if "phi" in drawn else [])}
     if "displacement_amplitude" in plan.coords and {"displacement_amplitude", "frequency"} & dropped:
         dropped.add("amplitude")  # A = ω²d of no value is nobody's amplitude
@@ -267,7 +254,7 @@ class SamplePlan(plans.Plan):
             del self.results["mode_share"]
         self.names = tuple(self.results)
         clock = "frequency" if is_wave else "time_scale"
-        inputs = grid_inputs.inputs_of(problem, coords)
+        inputs = self.inputs = grid_inputs.inputs_of(problem, coords)
         if "phi" in coords and "phi" in drawn:
             inputs["phi"] = coords["phi"]
         if "displacement_amplitude" in {*inputs, *drawn}:
@@ -294,18 +281,18 @@ class SamplePlan(plans.Plan):
         if self.scaled:
             self.frequency = inputs[clock] if is_wave else 1.0 / inputs[clock]
             inputs[clock] = xr.Variable((), 1.0)
-        self.inputs = inputs
         self.attrs = attrs | ({"pooled": resources.grid_text(self.pooled)} if self.pooled else {})
-        #: Samples and runs of a grid point, all draws with all that is pooled; how many points are solved together.
+        #: Samples and runs of a grid point, all draws with all that is pooled.
         self.samples, self.runs = (n * math.prod(self.pooled.values()) for n in (sampling.samples, sampling.runs))
-        self.points = max(_CELLS // self.runs, 1)
+        #: How many points are solved together: in 30 MB, yet enough to keep the kernels busy.
+        self.points = max(1_000_000 // self.runs, 1)
         # as of any plan
         self.together = tuple(self.scaled)
         self.cost = max(1.0, solvers.cost_of(problem) * self.runs / math.prod(self.scaled.values()))
         run = 24 * len(drawn) + self.points * (8 * (2 + len(drawn)) + 11)
         self.memory = self.runs * run + solvers.memory_of(problem)
         if sampling.sensitivity:
-            self.cost += _SOBOL_COST
+            self.cost += 30_000  # cells of the cycle solver: the time of the bootstrap
             self.memory += SOBOL_MEMORY + 64 * sampling.runs
 
     @property
@@ -338,10 +325,7 @@ class SamplePlan(plans.Plan):
         return xr.Dataset(results, self.coords | own_coords, self.attrs).drop_dims(self.pooled)
 
     def solve(self, progress: Callable[[int], None] | None = None) -> xr.Dataset:
-        """Solve the samples, a million at a time, and reduce them to what `slipsweep.sample` returns.
-
-        `progress` is called with a number of samples just solved, from any thread.
-        """
+        """Solve the samples, a million at a time, and reduce them to what `slipsweep.sample` returns."""
         parameters.check_progress(progress)
         table = self.template()
         resources.check_memory(
@@ -360,11 +344,7 @@ class SamplePlan(plans.Plan):
         return table
 
     def _statistics(self, chunk: chunks.Chunk, progress: Callable[[int], None] | None) -> dict[str, NDArray[Any]]:
-        """The results at the grid points of a chunk, (solved, frequencies, own dimension).
-
-        Quantiles, mean, probabilities and shares are of the samples that have a value; probabilities also count the
-        statically unstable ones, as exceeding every threshold.
-        """
+        """The results at the grid points of a chunk, (solved, frequencies, own dimension)."""
         sampling, sizes = self.sampling, {dim: cut.stop - cut.start for dim, cut in chunk.items()}
         inputs, drawn = self._drawn(chunk, sizes)
         names = ("permanent_displacement", "validity", *(["sliding_mode"] if "mode_share" in self.names else []))
@@ -375,8 +355,8 @@ class SamplePlan(plans.Plan):
         clocks = self.frequency.isel(chunk, missing_dims="ignore").set_dims(sizes | self.scaled)
         frequency = clocks.values.reshape(len(displacement), -1)
         squares = frequency[..., np.newaxis] ** 2
-        quantiles = np.full((*frequency.shape, sampling.quantiles.size), np.nan)
-        means = np.full((*frequency.shape, 1), np.nan)
+        # quantiles, and last the mean
+        moved = np.full((*frequency.shape, sampling.quantiles.size + 1), np.nan)
         exceeding = np.full((*frequency.shape, sampling.thresholds.size), np.nan)
 
         def reduce(point: int) -> None:
@@ -389,16 +369,15 @@ class SamplePlan(plans.Plan):
                 exceeding[point] = (above + unstable) / (values.size + unstable)
             if values.size:
                 with np.errstate(over="ignore"):  # refused below
-                    quantiles[point] = np.quantile(values, sampling.quantiles) / squares[point]
-                    means[point] = values.mean() / squares[point]
+                    moved[point] = np.append(np.quantile(values, sampling.quantiles), values.mean()) / squares[point]
 
         threads.spread(range(len(displacement)), reduce)
-        for wrong in frequency[(np.isinf(quantiles) | np.isinf(means)).any(axis=-1)][:1]:
+        for wrong in frequency[np.isinf(moved).any(axis=-1)][:1]:
             text = parameters.number_text(float(wrong))
             raise InputError(f"frequency or 1 / time_scale = {text}: must be nearer to 1")
         found = {
-            "displacement_quantile": quantiles,
-            "mean_displacement": means,
+            "displacement_quantile": moved[..., :-1],
+            "mean_displacement": moved[..., -1],
             "exceedance_probability": exceeding,
             "flag_share": np.stack([np.mean(flags & flag.value != 0, axis=-1) for flag in variables.Validity], axis=-1),
             "valueless_share": np.isnan(displacement).mean(axis=-1),
