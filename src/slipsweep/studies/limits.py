@@ -1,8 +1,10 @@
 """The inverse of a sweep: the smallest amplitude at which a tolerable displacement is reached.
 
-Steps of the scan that `limit_amplitude` describes are cut into parts where they may hide a peak, and where u jumps or
-grows beyond all bounds the place is located; docs/limit.md says what is missed all the same.  The first step that
-reaches the target is halved until two neighbouring double-precision numbers are left.  All cells are solved together.
+The displacement u(A) jumps where the sliding mode changes, may fall after a jump, and has gaps where the model gives no
+value.  So every block is first scanned from its yield acceleration upwards, including both sides of the amplitudes at
+which its mode changes.  Steps of the scan that may hide a peak are cut into parts, and where u jumps or grows beyond
+all bounds the place is located; docs/limit.md says what is missed all the same.  The first step that reaches the target
+is halved until two neighbouring double-precision numbers are left.  All cells are solved together.
 """
 
 import math
@@ -41,6 +43,9 @@ AMPLITUDE_STEPS = 256
 
 #: The dimension of the amplitudes that a scan tries.
 _ALONG = "scanned amplitude"
+
+#: A rise of u between neighbouring amplitudes by more than this part of it is a jump.
+JUMP = 1e-6
 
 #: Displacements scanned together: 16 MB, and as much again to compare them.
 SCANNED = 2_000_000
@@ -222,7 +227,7 @@ def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> dict[
     for name, values in {**after, "limit_amplitude": high}.items():
         results[name][cell] = values
     below, above = before["permanent_displacement"], after["permanent_displacement"]
-    jumps = above - below > 1e-6 * above
+    jumps = above - below > JUMP * above
     modes = [name for name in ("sliding_mode", "stick_slip_pulses", "continuous_pulses") if name in after]
     other_mode = np.any([before[name] != after[name] for name in modes], axis=0)
     results["limit_status"][cell] = np.select(
