@@ -119,7 +119,6 @@ def calibrate(
     chosen = options.MODELS.of(model)
     if not isinstance(chosen, options.Mendez):
         raise InputError(f"model = {chosen!r}: must be 'mendez': Newmark's block has no λ and no Δμ")
-    drifts = [drift] if isinstance(drift, str) else list(drift)
     if noise is not None and not isinstance(noise, Mapping):
         raise InputError(f"noise = {parameters.shown(noise)}: must be a mapping of channels to standard deviations")
     for name, value in (noise or {}).items():
@@ -127,7 +126,7 @@ def calibrate(
             raise InputError(f"noise.{name} = {parameters.shown(value)}: must be a finite number > 0")
 
     def observed(*more: str) -> list[Observation]:
-        return [Observation(one, theta, mu_s, chosen, offset, [*drifts, *more], noise or {}) for one in tests]
+        return [Observation(one, theta, mu_s, chosen, offset, drift, noise or {}, more) for one in tests]
 
     observations = observed()
     found = estimate(observations)
@@ -140,8 +139,12 @@ def calibrate(
     drifting: list[str] = []
     if _misfits(found) and not any(one.attrs["constant_friction"] for one in statics):
         # of which channels an offset and a drift, that were not given, would explain a misfit
-        measured = [name for name in RESPONSES if all(name in one.responses for one in tests) and name not in drifts]
-        drifting = [name for name in measured if not _misfits(estimate(observed(name)))]
+        drifting = [
+            name
+            for name in RESPONSES
+            if all(name in one.channels and name not in one.drifts for one in observations)
+            and not _misfits(estimate(observed(name)))
+        ]
     parts = [_of_test(one, found, cycles) for one in observations]
     whole = parts[0] if len(parts) == 1 else xr.concat(parts, "test", join="outer", combine_attrs="override")
     whole = whole.merge(_of_all(found)).assign(statics[0].variables)

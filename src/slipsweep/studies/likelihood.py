@@ -17,7 +17,7 @@ a sharp one or without noise.  A kink is put where the shaking begins and ends i
 
 import functools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -134,10 +134,10 @@ class Linear:
 class Observation:
     """A test and what is known of its sensors, checked, and the likelihood that it gives.
 
-    `channels` of the block have the noise `sensor_noise` as neighbouring samples scatter, or as given.  `lines` are
-    offsets, drifts and steps, those of the table first; `wrong` the most likely errors of the table's motion and its
-    lines, in standard deviations; `upslope` the times at which slips begin that are left out.  `forward` and `linear`
-    are the model and the likelihood near the last solution (`linearize`).
+    `channels` of the block have the noise `sensor_noise` as neighbouring samples scatter, or as given.  `drifts` may
+    drift: those given and `drifting`.  `lines` are offsets, drifts and steps, those of the table first; `wrong` the
+    most likely errors of the table's motion and its lines, in standard deviations; `upslope` the times at which slips
+    begin that are left out.  `forward` and `linear` are the model and the likelihood near the last solution.
     """
 
     forward: Forward
@@ -145,7 +145,7 @@ class Observation:
 
     def __init__(
         self, test: ShakingTest, theta: float, mu_s: float, model: Mendez, offset: Any, drift: Any,
-        noise: Mapping[str, float],
+        noise: Mapping[str, float], drifting: Sequence[str] = (),
     ) -> None:  # fmt: skip
         if not test.responses:
             raise InputError(
@@ -155,7 +155,8 @@ class Observation:
         check_contact(test, theta, model.g)
         if not float(test.channels[TABLE].max()) > 0.0:
             raise InputError(f"{test.name}: {TABLE}: never positive: the table does not drive the block downslope")
-        offsets, drifts = check_channels("offset", offset, test.channels), check_channels("drift", drift, test.channels)
+        offsets = check_channels("offset", offset, test.channels)
+        self.drifts = (*check_channels("drift", drift, test.channels), *drifting)
         self.test, self.theta, self.mu_s, self.model, self.channels = test, theta, mu_s, model, test.responses
         measured = np.array([test.channels[name] for name in self.channels])
         # the last sample is that at which a record ends
@@ -173,9 +174,9 @@ class Observation:
         since = (test.times - test.times[0]) / (test.times[-1] - test.times[0])
         for name, values in test.channels.items():
             size = _LARGE * float(np.nanmax(np.abs(values)))
-            if name in offsets or name in drifts:
+            if name in offsets or name in self.drifts:
                 self.lines.append(Line("offset", name, size, np.full(since.size, size)))
-            if name in drifts:
+            if name in self.drifts:
                 self.lines.append(Line("drift", name, size, size * since))
         self.motion = table_motion(test.times, test.channels[TABLE])
         of_table = [np.interp(self.motion.times, test.times, one.values) for one in self.lines if one.channel == TABLE]
