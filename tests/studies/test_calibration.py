@@ -168,12 +168,13 @@ def test_sensors_at_fault(clean: dict[str, xr.Dataset]) -> None:
     assert found.attrs["model_table"].startswith("# WARNING: not ready for use.\n# The misfit is larger")
     assert found.attrs["uncertainty_table"] == ""
     test.ground_acceleration.values[:] += 0.2
-    asked = calibrated(test, drift="relative_displacement", offset="ground_acceleration")
-    check_intervals(asked, CALIBRATED["stick_slip"])
     drift = 0.2 * float(np.ptp(test.time.values))
-    for name, true in (("drift of relative_displacement", drift), ("offset of ground_acceleration", 0.2)):
-        (said,) = re.findall(rf"{name}: ([\d.]+) ± ([\d.]+)", asked.attrs["removed"])
-        assert abs(float(said[0]) - true) < min(3.5 * float(said[1]), 0.1 * true), name
+    for drifts in ("relative_displacement", "all"):
+        asked = calibrated(test, drift=drifts, offset="ground_acceleration")
+        check_intervals(asked, CALIBRATED["stick_slip"])
+        for name, true in (("drift of relative_displacement", drift), ("offset of ground_acceleration", 0.2)):
+            (said,) = re.findall(rf"{name}: ([\d.]+) ± ([\d.]+)", asked.attrs["removed"])
+            assert abs(float(said[0]) - true) < min(3.5 * float(said[1]), 0.1 * true), name
 
 
 def test_unequal_sampling_gaps_and_an_early_end(clean: dict[str, xr.Dataset]) -> None:
@@ -225,6 +226,7 @@ def test_the_tables_to_paste_run(clean: dict[str, xr.Dataset], tmp_path: Path) -
         ({}, {"noise": {"block_acceleration": 0.0}}, "noise.block_acceleration = 0.0: must be"),
         ({}, {"noise": {"friction": 1.0}}, "noise = 'friction': must be"),
         ({}, {"offset": ["table"]}, "offset = 'table': must be"),
+        ({}, {"drift": 3}, "drift = 3: must be a list of channels"),
         ({"ground_acceleration": -1.0}, {}, "never positive"),
         ({"ground_acceleration": 1000.0}, {}, "the block would lift off"),
     ],

@@ -1,10 +1,7 @@
-"""Calibration: Üy, λ and Δμ from one or several tests on a shaking table, together and cycle by cycle.
-
-Sentences say what the tests do not determine and what would; tables for sweep files have the parameters.
-"""
+"""Calibration: Üy, λ and Δμ from one or several tests on a shaking table, together and cycle by cycle."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,23 +15,12 @@ from slipsweep.studies.estimate import Estimate, cycle_estimate, estimate
 from slipsweep.studies.friction import Floats
 from slipsweep.studies.likelihood import SOUGHT, Observation, runs_of
 
-#: Part of the largest acceleration that a pulse has at least to be a cycle, and fewest samples of one.
-_A_CYCLE, _FEWEST_IN_A_CYCLE = 0.1, 12
+#: The peak of a cycle at least, and what a table that moves exceeds, in parts of its largest acceleration; fewest
+#: samples of a cycle.
+_A_CYCLE, _MOVES, _FEWEST_IN_A_CYCLE = 0.1, 0.1, 12
 
 #: Symbols and units of what is sought.
 _SYMBOL, _UNIT = ("Üy", "λ", "Δμ"), (" m/s2", "", "")
-
-#: Largest correlation that is written.
-_MOST_CORRELATION = 0.9998
-
-#: Part of the table's largest acceleration beyond which it moves.
-_MOVES = 0.1
-
-#: How many times the noise, and which part of the largest value, a misfit must be to be reported.
-_WORSE, _MISSES = 1.5, 0.01
-
-#: Factors on the motion at which the displacements of allowed parameters are compared, and how many parameters.
-_FACTORS, _COMPARED = (0.6, 0.8, 1.25, 1.5, 2.0), 24
 
 _ANOTHER = "Test at another amplitude and give calibrate all tests together"
 
@@ -100,17 +86,10 @@ def calibrate(
 
     Examples
     --------
-    A test of two cycles without noise, as `simulate` gives it:
-
-    >>> import numpy as np
     >>> import slipsweep
-    >>> test = slipsweep.simulate(
-    ...     5, 0.38, 5.0, 2.0, yield_acceleration=1.8, decay_rate=2.0, delta_mu=0.1,
-    ...     excitation=slipsweep.Sine(cycles=2), times=np.arange(240) * 0.005,
-    ... )
-    >>> found = slipsweep.calibrate(test, theta=5, mu_s=0.38, cycles=False)
-    >>> print(f"{found.yield_acceleration.item():.2f} m/s2, {found.decay_rate.item():.2f}, {found.delta_mu.item():.2f}")
-    1.80 m/s2, 2.00, 0.10
+    >>> found = slipsweep.calibrate("sweeps/data/shaking_test.csv", theta=5, mu_s=0.38, cycles=False)
+    >>> print(f"{found.yield_acceleration.item():.1f} m/s2, {found.decay_rate.item():.1f}, {found.delta_mu.item():.1f}")
+    1.8 m/s2, 2.0, 0.1
     """
     tests = [friction.test_of(one) for one in (test if isinstance(test, list | tuple) else [test])]
     if not tests:
@@ -119,7 +98,6 @@ def calibrate(
     chosen = options.MODELS.of(model)
     if not isinstance(chosen, options.Mendez):
         raise InputError(f"model = {chosen!r}: must be 'mendez': Newmark's block has no λ and no Δμ")
-    drifts = [drift] if isinstance(drift, str) else list(drift)
     if noise is not None and not isinstance(noise, Mapping):
         raise InputError(f"noise = {parameters.shown(noise)}: must be a mapping of channels to standard deviations")
     for name, value in (noise or {}).items():
@@ -127,7 +105,7 @@ def calibrate(
             raise InputError(f"noise.{name} = {parameters.shown(value)}: must be a finite number > 0")
 
     def observed(*more: str) -> list[Observation]:
-        return [Observation(one, theta, mu_s, chosen, offset, [*drifts, *more], noise or {}) for one in tests]
+        return [Observation(one, theta, mu_s, chosen, offset, drift, noise or {}, more) for one in tests]
 
     observations = observed()
     found = estimate(observations)
@@ -137,11 +115,8 @@ def calibrate(
         if any(one.upslope for one in observations):
             found = estimate(observations)
     statics = [_statics(one) for one in observations]
-    drifting: list[str] = []
-    if _misfits(found) and not any(one.attrs["constant_friction"] for one in statics):
-        # of which channels an offset and a drift, that were not given, would explain a misfit
-        measured = [name for name in RESPONSES if all(name in one.responses for one in tests) and name not in drifts]
-        drifting = [name for name in measured if not _misfits(estimate(observed(name)))]
+    constant = next((one for one in statics if one.attrs["constant_friction"]), None)
+    misfit = [] if constant is not None else _misfit(found, lambda name: estimate(observed(name)))
     parts = [_of_test(one, found, cycles) for one in observations]
     whole = parts[0] if len(parts) == 1 else xr.concat(parts, "test", join="outer", combine_attrs="override")
     whole = whole.merge(_of_all(found)).assign(statics[0].variables)
@@ -151,7 +126,7 @@ def calibrate(
         **(tests[0].attrs if len(tests) == 1 else {"tests": ", ".join(one.name for one in tests)}),
         **options.MODELS.attributes(chosen),
         "removed": "; ".join(dict.fromkeys(one.attrs["removed"] for one in parts)),
-        **_report(found, whole, statics, drifting),
+        **_report(found, whole, constant, misfit),
     }
     return whole
 
@@ -232,28 +207,24 @@ def _of_all(found: Estimate) -> xr.Dataset:
         of_interval = {**about, "long_name": f"95 % interval of the {about['long_name']}"}
         data[f"{name}_interval"] = ("bound", interval, of_interval)
     codes = {"flag_values": [0, 1, 2], "flag_meanings": " ".join(SOUGHT)}
-    first = found.observations[0]
     coords: dict[str, Any] = {
         name: (name, np.arange(3, dtype=np.int8), {"long_name": name.replace("_", " "), **codes}) for name in pair
     }
     coords["bound"] = friction.BOUND
-    coords |= {name: ((), getattr(first, name), variables.PARAMETERS[name]) for name in ("theta", "mu_s")}
+    for name in ("theta", "mu_s"):
+        coords[name] = ((), getattr(found.observations[0], name), variables.PARAMETERS[name])
     return xr.Dataset(data, coords)
 
 
-def _report(
-    found: Estimate, results: xr.Dataset, statics: Sequence[xr.Dataset], drifting: Sequence[str]
-) -> dict[str, str]:
+def _report(found: Estimate, results: xr.Dataset, constant: xr.Dataset | None, misfit: Sequence[str]) -> dict[str, str]:
     """All that must be said of a calibration, as attributes of its results.
 
-    `statics` are the coefficients of each test, `drifting` the channels with whose drift the misfit is explained.
-    The tables for a sweep file are commented out where the calibration has failed or determines too little.
+    `constant` are the coefficients of a test in which friction was constant, `misfit` sentences.  The tables for a
+    sweep file are commented out where the calibration has failed or determines too little.
     """
-    constant = next((one for one in statics if one.attrs["constant_friction"]), None)
     sentence = "" if constant is None else constant.attrs["constant_friction"]
     slides = bool((results["permanent_displacement"] != 0.0).any())
-    said = [sentence] if sentence else _misfit(found, drifting)
-    failed = bool(said)
+    said = [sentence] if sentence else [*misfit]
     for one in found.observations:
         first, most = float(one.motion.acceleration[0]), float(np.abs(one.motion.acceleration).max())
         if abs(first) > max(_MOVES * most, 3.0 * one.motion.noise):
@@ -277,7 +248,7 @@ def _report(
         said.append("The computed block does not come to rest before the next slide begins (flag not_recoupled).")
     if constant is not None:
         tables = _newmark_tables(found.observations[0], constant)
-    elif found.determined.all() and slides and not failed and not contradictions:
+    elif found.determined.all() and slides and not misfit and not contradictions:
         tables = _model_table(found), _uncertainty_table(found)
     else:
         comments = ["WARNING: not ready for use.", *said, "", *_model_table(found).splitlines()]
@@ -287,12 +258,10 @@ def _report(
 
 
 def _block_acceleration(test: ShakingTest) -> Floats | None:
-    """The block's acceleration, measured or from the relative velocity."""
-    if "block_acceleration" in test.channels:
-        return test.channels["block_acceleration"]
-    if "relative_velocity" in test.channels:
-        return np.asarray(test.channels[TABLE] - np.gradient(test.channels["relative_velocity"], test.times))
-    return None
+    """The block's acceleration, measured or from the relative velocity; None without either."""
+    if "block_acceleration" in test.channels or "relative_velocity" not in test.channels:
+        return test.channels.get("block_acceleration")
+    return np.asarray(test.channels[TABLE] - np.gradient(test.channels["relative_velocity"], test.times))
 
 
 def _statics(one: Observation) -> xr.Dataset:
@@ -306,26 +275,31 @@ def _statics(one: Observation) -> xr.Dataset:
 
 
 def _misfits(found: Estimate) -> dict[str, float]:
-    """Channels whose misfit is larger than their noise, as neighbouring samples scatter, and how many times."""
+    """Channels whose misfit is more than 1.5 times their noise and 1 % of their largest value, and how many times."""
     worse: dict[str, float] = {}
     for one in found.observations:
         of_channels = zip(one.channels, one.misfits(found.parameters), one.sensor_noise, one.largest, strict=True)
         for name, misfit, noise, largest in of_channels:
-            if misfit > max(_WORSE * noise, _MISSES * largest):
+            if misfit > max(1.5 * noise, 0.01 * largest):
                 worse[name] = max(misfit / noise, worse.get(name, 0.0))
     return worse
 
 
-def _misfit(found: Estimate, drifting: Sequence[str]) -> list[str]:
-    """Which channels are not explained, and which of them a drift would explain."""
-    listed = ", ".join(f"{name} {times:.2g} times" for name, times in _misfits(found).items())
-    text = (
+def _misfit(found: Estimate, with_drift: Callable[[str], Estimate]) -> list[str]:
+    """Which channels are not explained, and which of them an offset and a drift, that were not given, would explain."""
+    if not (misfits := _misfits(found)):
+        return []
+    listed = ", ".join(f"{name} {times:.2g} times" for name, times in misfits.items())
+    said = [
         f"The misfit is larger than the noise of the sensors: {listed}. The block did not move as in the model, or a "
         "sensor drifts: do not use the parameters before you know why (see the figure)."
-    )
-    explained = "taken out, the misfit is that of the sensors' noise: give drift ="
-    drifts = [f"With an offset and a drift of {name} {explained} {name!r}." for name in drifting]
-    return [text, *drifts] if listed else []
+    ]
+    for name in RESPONSES:
+        may_drift = all(name in one.channels and name not in one.drifts for one in found.observations)
+        if may_drift and not _misfits(with_drift(name)):
+            explained = "taken out, the misfit is that of the sensors' noise"
+            said.append(f"With an offset and a drift of {name} {explained}: give drift = {name!r}.")
+    return said
 
 
 def _contradiction(found: Estimate, one: Observation) -> list[str]:
@@ -380,18 +354,19 @@ def _remedy(found: Estimate) -> str:
     one = found.observations[0]
     if all("block_acceleration" not in each.test.channels for each in found.observations):
         return f"Measure the acceleration of the block, or t{_ANOTHER[1:]}."
-    some = np.unique(np.linspace(0, len(found.allowed) - 1, _COMPARED).astype(int))
+    factors = np.array([0.6, 0.8, 1.25, 1.5, 2.0])  # on the motion
+    some = np.unique(np.linspace(0, len(found.allowed) - 1, 24).astype(int))
     ends = np.argsort(found.allowed, axis=0)[[0, -1]].ravel()
     columns = found.allowed[[*some, *ends]].T
     cases = {name: xr.DataArray(column, dims="case") for name, column in zip(SOUGHT, columns, strict=True)}
-    moved = abs(found.summary(one, scale=list(_FACTORS), **cases)["permanent_displacement"])
+    moved = abs(found.summary(one, scale=factors, **cases)["permanent_displacement"])
     span = float(np.abs(found.summary(one)["permanent_displacement"]))
     low, high = moved.min(dim="case").values, moved.max(dim="case").values
     if not np.isfinite(high).any():
         return f"{_ANOTHER}."
     best = int(np.nanargmax((high - low) / (np.sqrt(low * high) + 0.05 * span)))
     return (
-        f"{_ANOTHER}: at {_FACTORS[best]:g} times this one ({_FACTORS[best] * one.peak:.3g} m/s2) the parameters that "
+        f"{_ANOTHER}: at {factors[best]:g} times this one ({factors[best] * one.peak:.3g} m/s2) the parameters that "
         f"fit give displacements from {low[best]:.2g} to {high[best]:.2g} m."
     )
 
@@ -412,9 +387,9 @@ def _uncertainty_table(found: Estimate) -> str:
     if not np.isfinite(found.errors).all():
         return ""
     lines = ["[uncertainty]"]
-    # a hair less than 1, so that with rounding a matrix of correlations stays positive
-    rounded = np.round(np.clip(found.correlation, -_MOST_CORRELATION, _MOST_CORRELATION), 4)
-    if np.linalg.eigvalsh(rounded + np.diag([1.0 - _MOST_CORRELATION] * 3)).min() > 1e-6:
+    most = 0.9998  # a hair less than 1, so that with rounding a matrix of correlations stays positive
+    rounded = np.round(np.clip(found.correlation, -most, most), 4)
+    if np.linalg.eigvalsh(rounded + np.diag([1.0 - most] * 3)).min() > 1e-6:
         pairs = [f'["{SOUGHT[i]}", "{SOUGHT[j]}", {rounded[i, j]:.4f}]' for i, j in ((0, 1), (0, 2), (1, 2))]
         lines.append(f"correlation = [{', '.join(pairs)}]")
     for name, value, error in zip(SOUGHT, found.parameters, found.errors, strict=True):

@@ -1,18 +1,13 @@
 """Üy, λ and Δμ from one or several tests: the best, and all that the data allow.
 
 Where the yield acceleration governs, λ and Δμ may be nearly anything; where Eq. 4 crosses the table's acceleration,
-Üy may.  A standard error describes neither, so an interval is the profile likelihood's: all values of a parameter
-for which some values of the others raise the sum of squares by less than the quantile of χ².
-
-These branches have different numbers of parameters that matter, and the one with most always fits best.  So a sum of
-squares is compared with the least of its own branch, for every branch that a much better one does not refute, and the
-interval is the union over these branches.
+Üy may.  A standard error describes neither, so an interval is the profile likelihood's, the union over these branches,
+each compared with its own least (docs/calibration.md).
 """
 
 import functools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -38,44 +33,27 @@ _ONSETS = (0.03, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 _DECAYS = (0.25, 0.5, 1.0, 2.0, 4.0)
 _EXCESS = (0.02, 0.1, 0.25)
 
-#: Starts that are followed roughly, and those of them that are followed to the end.
-_ROUGH, _FINE = 8, 4
-
-#: Most rounds in which the table's motion, the noise and the samples next to jumps settle.
-_ROUNDS = 5
-
-#: Accelerations of the table, in parts of its peak, at which friction is kept as λ and Δμ change together.
-_KEPT = (0.3, 0.6, 1.0)
-
-#: A parameter is not determined if half its interval is more than this part of it; of Δμ, of μs + Δμ.
-_UNDETERMINED = (0.5, 0.5, 0.3)
+#: Starts that are followed roughly, and to the end; rounds at most in which motion, noise and samples at jumps settle.
+_ROUGH, _FINE, _ROUNDS = 8, 4, 5
 
 
 class Scale:
     """Scaled parameters of the search, a point, and Üy, λ, Δμ."""
 
     def __init__(self, observations: Sequence[Observation]) -> None:
-        self.peaks = [one.peak for one in observations]
-        self.peak = max(self.peaks)
+        self.peak = max(one.peak for one in observations)
         self.mu_s, self.g = observations[0].mu_s, observations[0].model.g
         self.tan_theta = math.tan(math.radians(observations[0].theta))
 
     def parameters(self, point: Floats) -> Floats:
         return np.array([point[0] * self.peak, point[1] * self.g / self.peak, self.mu_s * math.expm1(point[2])])
 
-    def slopes(self, point: Floats) -> Floats:
-        """Derivatives of Üy, λ and Δμ by the scaled ones."""
-        return np.array([self.peak, self.g / self.peak, self.mu_s * math.exp(point[2])])
-
-    def readings(self, point: Floats) -> Readings:
-        """What decides the block's acceleration in each test.
+    def reading(self, point: Floats, peak: float) -> str:
+        """What decides the block's acceleration in a test with this peak of the table's.
 
         "continuous": Eq. 4 throughout.  "all": first Üy, later Eq. 4.  "crossing": Eq. 4, from where it crosses the
         table's acceleration on; Üy plays no part.  One value throughout: "held", Üy; "crossed", that at the crossing.
         """
-        return tuple(self._reading(point, peak) for peak in self.peaks)
-
-    def _reading(self, point: Floats, peak: float) -> str:
         onset, decay, excess = point
         table = np.linspace(0.0, 1.0, 65)[1:] * peak
         coupled = self.mu_s - self.tan_theta - self.mu_s * np.exp(excess - decay * table / self.peak)
@@ -98,20 +76,19 @@ class Scale:
 
 
 class Tried(NamedTuple):
-    """A point that was tried, what decides the block's acceleration there, and the sum of squares."""
+    """A point that was tried, what decides the block's acceleration there, and the sum of squares.
+
+    `branch` are the readings but for "crossed", which is "held": the least is the same.
+    """
 
     point: Floats
     readings: Readings
+    branch: Readings
     square: float
-
-    @property
-    def branch(self) -> Readings:
-        """Whether Üy or a crossing decides a constant acceleration, the least is the same."""
-        return tuple("held" if one == "crossed" else one for one in self.readings)
 
 
 class Search:
-    """Independent residuals and readings (`Scale.readings`) of points, and all points that were tried."""
+    """Independent residuals and readings (`Scale.reading`) of points, and all points that were tried."""
 
     def __init__(self, residuals: Callable[[Floats], Floats], readings: Callable[[Floats], Readings]) -> None:
         self._residuals, self._readings = residuals, readings
@@ -119,9 +96,9 @@ class Search:
         self._least: dict[Readings, float] = {}
 
     def residuals(self, point: Floats) -> Floats:
-        rest = self._residuals(point)
-        self.tried.append(Tried(np.array(point), self._readings(point), float(rest @ rest)))
-        branch = self.tried[-1].branch
+        rest, readings = self._residuals(point), self._readings(point)
+        branch = tuple("held" if one == "crossed" else one for one in readings)
+        self.tried.append(Tried(np.array(point), readings, branch, float(rest @ rest)))
         self._least[branch] = min(self.tried[-1].square, self._least.get(branch, math.inf))
         return rest
 
@@ -166,17 +143,13 @@ class Search:
     def slopes(self, point: Floats) -> Floats:
         """Derivatives of the residuals by the parameters, a column each."""
         columns = []
-        for at in range(point.size):
-            step = 1e-5 * np.eye(point.size)[at]
+        for at, step in enumerate(1e-5 * np.eye(point.size)):
             low, high = np.clip(point - step, LEAST, MOST), np.clip(point + step, LEAST, MOST)
             columns.append((self.residuals(high) - self.residuals(low)) / (high - low)[at])
         return np.column_stack(columns)
 
     def intervals(self, widths: Floats) -> Floats:
-        """95 % intervals, (parameters, 2); a bound of the search where the data set none.
-
-        `widths` are first guesses of the ends' distances from the best values.
-        """
+        """95 % intervals, (parameters, 2), from first guesses of half their widths; a bound where the data set none."""
         for _ in range(3):
             least = self.least
             found = np.array([[self.end(at, side, float(widths[at])) for side in (-1, 1)] for at in range(3)])
@@ -190,8 +163,7 @@ class Search:
     def end(self, at: int, side: int, width: float) -> float:
         """The lower (`side` −1) or upper (1) end of the interval of one parameter; the bound where the data set none.
 
-        The profile of each reading is followed from the outermost point known.  `width` is a first guess of the end's
-        distance from the best value.
+        The profile of each reading is followed from the outermost point known, by `width` at first.
         """
         outermost: dict[Readings, Floats] = {}
         for one in self.allowed():
@@ -230,14 +202,12 @@ class Search:
     def _profiled(self, at: int, value: float, near: Floats, along: Floats) -> tuple[Floats, float]:
         """The least rise of the sum of squares with one parameter held, and where: `along` leads from a point near."""
         change = value - near[at]
-        # and with the same friction at these accelerations of the table
-        kept = [[0.0, 1.0, table] if at == 1 else [0.0, 1.0 / table, 1.0] for table in _KEPT if at > 0]
+        # and with the same friction at three accelerations of the table, in parts of its peak
+        kept = [[0.0, 1.0, table] if at == 1 else [0.0, 1.0 / table, 1.0] for table in (0.3, 0.6, 1.0) if at > 0]
         starts = [near, near + change * along, *(near + change * np.array(one) for one in kept)]
         first = len(self.tried)
         for start in starts:
-            start = np.clip(start, LEAST, MOST)
-            start[at] = value
-            self.residuals(start)
+            self.residuals(_with(np.clip(start, LEAST, MOST), [at], value))
         held = sorted(self.tried[first:], key=lambda one: one.square)
         if min(map(self.above, held)) > SQUARE:
             others = [one for one in range(near.size) if one != at]
@@ -247,39 +217,22 @@ class Search:
         return best.point, self.above(best)
 
 
-@dataclass(frozen=True, eq=False)
-class Estimate:
+class Estimate(NamedTuple):
     """What one or several tests say of Üy, λ and Δμ.
 
-    `covariance` is that of the linear fit, NaN of what no sample depends on; `intervals`, (3, 2), are at 95 %, 0 and
-    inf where the data set no bound.  `allowed` are the parameters tried that the data allow, one set a row, and
-    `readings` what decides the block's acceleration for these, in any test (`Scale.readings`).
+    `intervals`, (3, 2), are at 95 %, 0 and inf where the data set no bound, and `determined` the parameters that these
+    bound well enough.  `errors` and `correlation`, of the linear fit, are NaN of the others.  `allowed` are parameters
+    tried that the data allow, one set a row, `readings` what decides the acceleration for these (`Scale.reading`).
     """
 
     parameters: Floats
-    covariance: Floats
+    errors: Floats
+    correlation: Floats
     intervals: Floats
+    determined: NDArray[np.bool_]
     allowed: Floats
     readings: set[str]
     observations: Sequence[Observation]
-
-    @property
-    def determined(self) -> NDArray[np.bool_]:
-        """Which parameters the tests determine: half an interval is no more than a part of the value (of μs + Δμ)."""
-        low, high = self.intervals.T
-        sizes = np.abs(self.parameters + np.array([0.0, 0.0, self.observations[0].mu_s]))
-        known = np.isfinite(high) & (high - low <= 2.0 * np.array(_UNDETERMINED) * sizes)
-        return np.asarray(known & [low[0] > 0.0, True, True])
-
-    @property
-    def errors(self) -> Floats:
-        """Standard errors; NaN of what is not determined."""
-        return np.where(self.determined, np.sqrt(np.diag(self.covariance)), np.nan)
-
-    @property
-    def correlation(self) -> Floats:
-        """Correlations of the parameters; NaN of what is not determined."""
-        return np.asarray(self.covariance / np.outer(self.errors, self.errors))
 
     def summary(self, one: Observation, **more: Any) -> xr.Dataset:
         """The results of a sweep for the parameters found, and the table's motion of a test; `more` replaces them."""
@@ -305,12 +258,21 @@ def estimate(observations: Sequence[Observation]) -> Estimate:
     width = 1.96 * np.sqrt(np.diag(_covariance(search.slopes(search.best))))
     intervals = search.intervals(np.where(np.isfinite(width), np.clip(width, 1e-5, 0.3), 0.1))
     intervals[0] = _beyond_mode_limit(intervals[0], observations, scale)
-    allowed, slopes = search.allowed(), scale.slopes(search.best)
     low, high = map(scale.parameters, intervals.T)
+    low, high = np.where(intervals[:, 0] == LEAST, 0.0, low), np.where(intervals[:, 1] == MOST, np.inf, high)
+    allowed, best = search.allowed(), scale.parameters(search.best)
+    # half an interval is no more than half of the value, of Δμ 0.3 of μs + Δμ
+    widest = 2.0 * np.array([0.5, 0.5, 0.3]) * np.abs(best + np.array([0.0, 0.0, scale.mu_s]))
+    determined = np.isfinite(high) & (high - low <= widest) & [low[0] > 0.0, True, True]
+    slopes = np.array([scale.peak, scale.g / scale.peak, scale.mu_s * math.exp(search.best[2])])
+    covariance = _covariance(search.slopes(search.best)) * np.outer(slopes, slopes)
+    errors = np.where(determined, np.sqrt(np.diag(covariance)), np.nan)
     return Estimate(
-        scale.parameters(search.best),
-        _covariance(search.slopes(search.best)) * np.outer(slopes, slopes),
-        np.column_stack([np.where(intervals[:, 0] == LEAST, 0, low), np.where(intervals[:, 1] == MOST, np.inf, high)]),
+        best,
+        errors,
+        covariance / np.outer(errors, errors),
+        np.column_stack([low, high]),
+        determined,
         np.array([scale.parameters(one.point) for one in allowed]),
         {reading for one in allowed for reading in one.readings},
         observations,
@@ -322,7 +284,8 @@ def _search(scale: Scale, observations: Sequence[Observation], near: Floats, rou
     for one in observations:
         one.linearize(scale.parameters(near), rough)
     return Search(
-        lambda point: np.concatenate([one.linear(scale.parameters(point)) for one in observations]), scale.readings
+        lambda point: np.concatenate([one.linear(scale.parameters(point)) for one in observations]),
+        lambda point: tuple(scale.reading(point, one.peak) for one in observations),
     )
 
 
@@ -357,17 +320,15 @@ def _try_branches(search: Search, scale: Scale) -> None:
 
 def _beyond_mode_limit(ends: Floats, observations: Sequence[Observation], scale: Scale) -> Floats:
     """Ends of Üy's interval; where one lies at the mode limit (Eq. 7) of a pulse, the error of its peak moves it."""
-    found, slope = ends.copy(), 1.0 - scale.tan_theta * (scale.mu_s - scale.tan_theta)
+    found, slope = ends, 1.0 - scale.tan_theta * (scale.mu_s - scale.tan_theta)
     for one in observations:
         motion, spread = one.record().acceleration, np.sqrt(np.sum(one.motion.shapes**2, axis=1))
         for part in runs_of(motion > 0.0):
             top = part.start + int(np.argmax(motion[part]))
             limit = (slope * motion[top] - scale.g * scale.mu_s) / scale.peak
             error = 1.96 * slope * spread[top] / scale.peak
-            for side in (0, 1):
-                if abs(ends[side] - limit) < error:
-                    outermost = max if side else min
-                    found[side] = np.clip(outermost(found[side], limit + (2 * side - 1) * error), LEAST[0], MOST[0])
+            beyond = np.clip([min(found[0], limit - error), max(found[1], limit + error)], LEAST[0], MOST[0])
+            found = np.where(np.abs(ends - limit) < error, beyond, found)
     return found
 
 
@@ -385,7 +346,7 @@ def cycle_estimate(linear: Linear, found: Estimate, free: list[int]) -> tuple[Fl
     return _with(none, free, fit.x), _with(none, free, np.sqrt(np.diag(covariance)))
 
 
-def _with(point: Floats, free: list[int], part: Floats) -> Floats:
+def _with(point: Floats, free: list[int], part: Floats | float) -> Floats:
     """A point with other values of some parameters."""
     point = point.copy()
     point[free] = part

@@ -4,9 +4,6 @@ The block slides where its acceleration is not the table's.  A slide is looked f
 r = Üg − Ü: it begins where |r| exceeds a threshold at two consecutive samples, and goes on until the relative velocity,
 the integral of r from there on, comes back to zero or r stays below the threshold.  The threshold stands above
 the noise of r, which is estimated from r itself.
-
-Eq. 1 is the paper's μ(t).  It calls friction whatever the table's acceleration exceeds the block's by.  The friction
-that acts on a block of horizontal acceleration Ü is, by statics, tan(θ + arctan(Ü/g)).
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,9 +26,6 @@ Floats = NDArray[np.float64]
 
 #: What a caller may give as a test.
 Test = str | Path | ShakingTest | xr.Dataset | Mapping[str, xr.DataArray]
-
-#: Third differences of white noise have 20 times its variance; those of a motion that the sampling resolves are small.
-_VARIANCE = 20.0
 
 #: The threshold of a slide: standard deviations of the noise of r, of which one sample in 16 000 exceeds 4 by chance,
 #: and at least a part of the table's largest acceleration, by which two sensors may disagree.
@@ -57,14 +51,14 @@ BOUND = xr.Variable(("bound",), [0.025, 0.975], {"units": "1", "long_name": "pro
 
 def noise_of(values: Floats) -> float:
     """Standard deviation of the noise of evenly or nearly evenly sampled values: robust, from third differences."""
-    differences = np.diff(values[np.isfinite(values)], 3) / _VARIANCE**0.5
+    # those of white noise have 20 times its variance; those of a motion that the sampling resolves are small
+    differences = np.diff(values[np.isfinite(values)], 3) / 20.0**0.5
     return float(1.4826 * np.median(np.abs(differences))) if differences.size else 0.0
 
 
 def threshold_of(table: Floats, block: Floats) -> tuple[float, str]:
     """The relative acceleration beyond which the block slides, m/s², and why that much."""
-    noise = noise_of(table - block)
-    least = LEAST_THRESHOLD * float(np.abs(table).max())
+    noise, least = noise_of(table - block), LEAST_THRESHOLD * float(np.abs(table).max())
     if NOISE_IN_THRESHOLD * noise < least:
         return least, f"{LEAST_THRESHOLD:.1%} of the largest acceleration of the table (the noise is smaller)"
     why = f"{NOISE_IN_THRESHOLD:g} standard deviations of the noise of the relative acceleration, {noise:.3g} m s-2"
@@ -112,10 +106,7 @@ def onset_acceleration(table: Floats, block: Floats, slide: slice, threshold: fl
 
 
 def free_body_friction(block: Floats, theta: float, g: float) -> Floats:
-    """The friction coefficient that acts on a block of horizontal acceleration Ü: tan(θ + arctan(Ü/g)).
-
-    At rest it is the mobilised friction.
-    """
+    """The friction coefficient that acts on a block, at rest the mobilised one: tan(θ + arctan(Ü/g))."""
     return np.asarray(np.tan(np.radians(theta) + np.arctan(block / g)))
 
 
@@ -134,7 +125,7 @@ def coefficients_of(
     """
     threshold, relative = threshold_of(table, block)[0], table - block
     eq1, free = eq1_friction(table, block, theta, mu_s, g), free_body_friction(block, theta, g)
-    inside, starts, between = [], [], []
+    inside, begins = [], []
     for slide in slides:
         part = slice(slide.start + _AT_ENDS, (slide.stop or table.size) - _AT_ENDS)
         downslope = np.nanmean(relative[slide.start : slide.start + _AT_ENDS]) > 0.0
@@ -144,16 +135,15 @@ def coefficients_of(
         first = slide.start + int(np.argmax(relative[slide] > threshold))
         begin, before, after = np.nanmean(block[first : first + _FIRST]), table[max(first - 1, 0)], table[first]
         jumps = before - begin > threshold  # else it would have been seen to slide at the sample before
-        starts.append(0.5 * (before + after) if jumps else begin)
-        between.append(0.5 * (after - before) if jumps else 0.0)
+        begins.append((0.5 * (before + after), 0.5 * (after - before)) if jumps else (begin, 0.0))
     static = kinetic = np.full(3, np.nan)
     constant = False
     if inside:
         slope = 1.0 / g / np.cos(np.radians(theta)) ** 2  # of friction by the block's acceleration, near enough
         noise, every = noise_of(block) * slope, np.concatenate(inside)
-        levels = np.array([np.nanmean(one[:, 0]) for one in inside])
+        levels, (starts, between) = np.array([np.nanmean(one[:, 0]) for one in inside]), np.array(begins).T
         kinetic = _mean(levels, noise / (every.shape[0] / len(levels)) ** 0.5, 0.0)
-        static = _mean(free_body_friction(np.array(starts), theta, g), noise, float(np.mean(between)) * slope)
+        static = _mean(free_body_friction(starts, theta, g), noise, float(np.mean(between)) * slope)
         scatter = float(np.nanmean((every[:, 0] - kinetic[1]) ** 2)) - noise**2
         level = kinetic[1] > 0.0 and max(scatter, 0.0) ** 0.5 < _LEVEL * kinetic[1]
         constant = level and float(np.nanquantile(every[:, 1], _LOW_SHARE)) < _LOW * mu_s

@@ -3,21 +3,11 @@
 Beside Üy, λ and Δμ stand nuisance parameters with known standard deviations: errors of the table's motion
 (`table_motion`), offsets and drifts of sensors.  What is computed depends on them linearly, near enough, so that they
 need no search: scaled residuals have the covariance 1 + E Eᵀ, E being the effects of one standard deviation of each,
-and are made independent by it.
-
-Three kinds of samples count less.  The block's acceleration jumps where the block stops, and a sample beside a jump
-tells only on which side of it the jump lies: it is left out.  Readings of a converter that repeat are one
-reading: n of them have the weight of one.  Slips upslope, which stick-slip does not have, are left out.
-
-The motion of the table behind its noisy record is a least-squares spline.  The block integrates the table's
-acceleration and its own rises with the largest that the table reached: noise taken for motion would shift both.
-Akaike's criterion (corrected for few samples) chooses the number of coefficients: few under a smooth motion, many under
-a sharp one or without noise.  A kink is put where the shaking begins and ends if the criterion asks for it.
+and are made independent by it.  Which samples count less, and why the table's motion is a spline: docs/calibration.md.
 """
 
-import functools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,53 +29,29 @@ from slipsweep.motion.records import Record
 from slipsweep.motion.shaking import RESPONSES, TABLE, ShakingTest, check_channels
 from slipsweep.studies.friction import Floats, check_contact, noise_of
 
-Mask = NDArray[np.bool_]
-
 #: The series of `HISTORY` at some times, for Üy, λ and Δμ.
 Forward = Callable[[Floats, Floats], Mapping[str, Floats]]
 
 #: What is sought, in the order of all vectors.
 SOUGHT = ("yield_acceleration", "decay_rate", "delta_mu")
 
-#: The least noise that a channel is taken to have, in parts of its largest value.
-_LEAST_NOISE = 1e-5
+#: In parts of a channel's largest value: the least noise that it is taken to have, the noise of a rough likelihood, and
+#: the standard deviation of an offset, drift or step: no bound, in effect.
+_LEAST_NOISE, _ROUGH_NOISE, _LARGE = 1e-5, 0.1, 3.0
 
-#: Intervals of sampling to either side of a jump that are left out.
-_BESIDE_A_JUMP = 1.6
+#: Intervals of sampling to either side of a jump that are left out; consecutive samples, and standard deviations of the
+#: noise, by which a block slips upslope.
+_BESIDE_A_JUMP, _UPSLOPE_SAMPLES, _UPSLOPE_NOISE = 1.6, 4, 5.0
 
-#: Standard deviation of an offset, drift or step, in parts of a channel's largest value: no bound, in effect.
-_LARGE = 3.0
+#: Degree of the table's spline, and most coefficients whose uncertainty is followed; each costs a solution.
+_DEGREE, _MOST_SHAPES = 3, 150
 
-#: Noise of the channels, in parts of their largest values, of a rough likelihood.
-_ROUGH_NOISE = 0.1
-
-#: Steps of the derivatives by errors of the table's motion and by its offset, in standard deviations.
-_SHAPE_STEP, _LINE_STEP = 0.3, 1e-3
-
-#: Consecutive samples, and standard deviations of the noise, by which a block slips upslope.
-_UPSLOPE_SAMPLES, _UPSLOPE_NOISE = 4, 5.0
-
-#: Degree of the table's spline.
-_DEGREE = 3
-
-#: Samples for each coefficient that are tried.
-_SPACINGS = (64, 48, 32, 24, 16, 12, 10, 8, 6, 5, 4, 3, 2)
-
-#: Spacings by which the knots are closer than the criterion says: what a spline cannot follow is no noise, and enters
-#: no interval.
-_FINER = 2
-
-#: Most coefficients whose uncertainty is followed; each costs a solution.
-_MOST_SHAPES = 150
+#: Samples for each coefficient that are tried, and by how many of these spacings the knots are closer than the
+#: criterion says: what a spline cannot follow is no noise, and enters no interval.
+_SPACINGS, _FINER = (64, 48, 32, 24, 16, 12, 10, 8, 6, 5, 4, 3, 2), 2
 
 #: Multiples of the noise beyond which the table moves, and samples before that where a kink is tried.
 _MOVES, _KINK_SAMPLES = 5.0, 12
-
-#: Linear interpolation of the spline is wrong by this part of the noise at most, between these numbers of points.
-_INTERPOLATION, _FEWEST_POINTS, _MOST_POINTS = 0.1, 4, 32
-
-#: Multiple of the standard deviation of a converter's errors that is taken for their noise.
-_CONVERTER = 1.6
 
 
 class Line(NamedTuple):
@@ -134,18 +100,15 @@ class Linear:
 class Observation:
     """A test and what is known of its sensors, checked, and the likelihood that it gives.
 
-    `channels` of the block have the noise `sensor_noise` as neighbouring samples scatter, or as given.  `lines` are
-    offsets, drifts and steps, those of the table first; `wrong` the most likely errors of the table's motion and its
-    lines, in standard deviations; `upslope` the times at which slips begin that are left out.  `forward` and `linear`
-    are the model and the likelihood near the last solution (`linearize`).
+    `channels` of the block have the noise `sensor_noise` as neighbouring samples scatter, or as given.  `drifts` may
+    drift: those given and `drifting`.  `lines` are offsets, drifts and steps, those of the table first; `wrong` the
+    most likely errors of the table's motion and its lines, in standard deviations; `upslope` the times at which slips
+    begin that are left out.  `forward` and `linear` are the model and the likelihood near the last solution.
     """
-
-    forward: Forward
-    linear: Linear
 
     def __init__(
         self, test: ShakingTest, theta: float, mu_s: float, model: Mendez, offset: Any, drift: Any,
-        noise: Mapping[str, float],
+        noise: Mapping[str, float], drifting: Sequence[str] = (),
     ) -> None:  # fmt: skip
         if not test.responses:
             raise InputError(
@@ -155,7 +118,8 @@ class Observation:
         check_contact(test, theta, model.g)
         if not float(test.channels[TABLE].max()) > 0.0:
             raise InputError(f"{test.name}: {TABLE}: never positive: the table does not drive the block downslope")
-        offsets, drifts = check_channels("offset", offset, test.channels), check_channels("drift", drift, test.channels)
+        offsets = check_channels("offset", offset, test.channels)
+        self.drifts = (*check_channels("drift", drift, test.channels), *drifting)
         self.test, self.theta, self.mu_s, self.model, self.channels = test, theta, mu_s, model, test.responses
         measured = np.array([test.channels[name] for name in self.channels])
         # the last sample is that at which a record ends
@@ -173,20 +137,16 @@ class Observation:
         since = (test.times - test.times[0]) / (test.times[-1] - test.times[0])
         for name, values in test.channels.items():
             size = _LARGE * float(np.nanmax(np.abs(values)))
-            if name in offsets or name in drifts:
+            if name in offsets or name in self.drifts:
                 self.lines.append(Line("offset", name, size, np.full(since.size, size)))
-            if name in drifts:
+            if name in self.drifts:
                 self.lines.append(Line("drift", name, size, size * since))
         self.motion = table_motion(test.times, test.channels[TABLE])
+        self.peak = float(self.motion.acceleration.max())
         of_table = [np.interp(self.motion.times, test.times, one.values) for one in self.lines if one.channel == TABLE]
         self._shapes = np.column_stack([self.motion.shapes, *(-line for line in of_table)])
         self.wrong = np.zeros(self._shapes.shape[1])
         self.upslope: list[float] = []
-
-    @property
-    def peak(self) -> float:
-        """Largest acceleration of the table, m/s²."""
-        return float(self.motion.acceleration.max())
 
     def record(self, wrong: Floats | None = None) -> Record:
         """The table's motion as last estimated, or with so many standard deviations of each of its errors."""
@@ -219,26 +179,26 @@ class Observation:
 
     def linearize(self, parameters: Floats, rough: bool = False) -> None:
         """Set `linear` near a solution; `rough` as if the table's record had no noise, and the channels had much."""
+        self.forward = self._forward()
 
-        def computed(by: Forward, parameters: Floats) -> Floats:
+        def computed(parameters: Floats, by: Forward = self.forward) -> Floats:
             return self._weighted(by(parameters, self.test.times))
 
-        self.forward = self._forward()
         self._counted = self._use & ~self._beside_jumps
         noise = np.maximum(self._noise, _ROUGH_NOISE * self.largest * rough)
         self._scale = (self._weights / noise[:, None])[self._counted]
-        base = computed(self.forward, parameters)
+        base = computed(parameters)
         shapes, moving = self.motion.shapes.shape[1], self.wrong.size
         effects = np.zeros((base.size, shapes + len(self.lines)))
         for at in range(shapes if rough else 0, moving):
             moved = self.wrong.copy()
-            moved[at] += _SHAPE_STEP if at < shapes else _LINE_STEP
-            change = computed(self._forward(moved), parameters) - base
+            moved[at] += 0.3 if at < shapes else 1e-3  # steps of the derivatives, in standard deviations
+            change = computed(parameters, self._forward(moved)) - base
             effects[:, at] = np.nan_to_num(change) / (moved[at] - self.wrong[at])
         for at, line in enumerate(self.lines[moving - shapes :], moving):
             effects[:, at] = self._weighted({line.channel: line.values})
         measured = self._weighted(self.test.channels) + effects[:, :moving] @ self.wrong
-        self.linear = Linear(functools.partial(computed, self.forward), measured, effects)
+        self.linear = Linear(computed, measured, effects)
 
     def _unexplained(self, parameters: Floats) -> list[Floats]:
         """What nothing explains of the samples of each channel, in its own unit."""
@@ -272,8 +232,8 @@ class Observation:
             row = self.channels.index("block_acceleration")
             self._beside_jumps[row] = self._next_to_jumps(parameters, self._noise[row])
 
-    def _next_to_jumps(self, parameters: Floats, noise: float) -> Mask:
-        """Samples next to a time at which the block's computed acceleration jumps by more than the noise."""
+    def _next_to_jumps(self, parameters: Floats, noise: float) -> NDArray[np.bool_]:
+        """Samples next to a jump of the block's computed acceleration: they tell on which side of it the jump lies."""
         times = self.test.times
         fine = np.interp(np.arange(0, times.size - 1, 0.125), np.arange(times.size), times)
         history = self._forward()(parameters, fine)
@@ -291,12 +251,11 @@ class Observation:
     def leave_out_upslope_slips(self) -> None:
         """Leave out the samples of slips upslope, after each of which the displacement may have stepped."""
         times, channels = self.test.times, self.test.channels
-        if "relative_velocity" in channels:
-            velocity = channels["relative_velocity"]
-        elif "relative_displacement" in channels:
-            velocity = np.gradient(channels["relative_displacement"], times)
-        else:
+        if self.channels == ("block_acceleration",):  # no velocity
             return
+        velocity = channels.get("relative_velocity")
+        if velocity is None:
+            velocity = np.gradient(channels["relative_displacement"], times)
         noise = max(noise_of(velocity), 2e-3 * float(np.nanmax(np.abs(velocity))))
         upslope = np.nan_to_num(velocity) < -_UPSLOPE_NOISE * noise
         several = ndimage.binary_opening(upslope, np.ones(_UPSLOPE_SAMPLES))
@@ -311,10 +270,7 @@ class Observation:
 
 
 def _weights_of(values: Floats) -> Floats:
-    """Square roots of the samples' weights: readings at one level, several in turn, have the weight of one.
-
-    A converter's error is the same in all of them, also where the block holds one acceleration in each cycle.
-    """
+    """Square roots of the samples' weights: readings of a level that repeats have one error and the weight of one."""
     repeated = np.diff(values) == 0.0
     runs = np.append(repeated, False) | np.append(False, repeated)
     weights = np.ones(values.size)
@@ -347,7 +303,7 @@ class _Fitted(NamedTuple):
 def converter_noise(values: Floats) -> float:
     """The least noise of digitised values: errors of a converter repeat from cycle to cycle and average out less."""
     steps = np.diff(np.unique(values[np.isfinite(values)]))
-    return _CONVERTER * float(steps.min(initial=np.inf)) / 12.0**0.5 if steps.size else 0.0
+    return 1.6 * float(steps.min()) / 12.0**0.5 if steps.size else 0.0  # that of rounding, 1.6 times
 
 
 def runs_of(holds: NDArray[np.bool_]) -> list[slice]:
@@ -360,11 +316,11 @@ def table_motion(times: Floats, acceleration: Floats) -> TableMotion:
     fits = [one for spacing in _SPACINGS if (one := _fitted(times, acceleration, _knots(times, spacing))) is not None]
     chosen = min(range(len(fits)), key=lambda at: fits[at].score)
     best, kinked = _with_kinks(times, acceleration, fits[min(chosen + _FINER, len(fits) - 1)])
-    knots = best.spline.t
-    bounds = np.unique(knots)
+    knots, bounds = best.spline.t, np.unique(best.spline.t)
+    # 4 to 32 points between knots, so that straight lines between them are wrong by a tenth of the noise at most
     curvature = np.abs(best.spline(times, nu=2)).max() * np.diff(bounds).max() ** 2 / 8.0
-    parts = np.sqrt(curvature / max(_INTERPOLATION * best.noise, 1e-9 * float(np.abs(acceleration).max())))
-    parts = int(np.clip(np.ceil(parts), _FEWEST_POINTS, _MOST_POINTS))
+    parts = np.sqrt(curvature / max(0.1 * best.noise, 1e-9 * float(np.abs(acceleration).max())))
+    parts = int(np.clip(np.ceil(parts), 4, 32))
     fine = np.interp(np.arange((bounds.size - 1) * parts + 1) / parts, np.arange(bounds.size), bounds)
     # of many coefficients only what is wrong over long times matters, which fewer can say
     coarse = knots if knots.size <= _MOST_SHAPES else _knots(times, -(-times.size // _MOST_SHAPES))
