@@ -24,7 +24,7 @@ LINES = {
     "motion": 2_010,
     "kernels": 3_150,
     "grid": 1_050,
-    "studies": 4_115,
+    "studies": 3_885,
     "files": 2_000,
     "charts": 2_520,
     "explore": 735,
