@@ -13,7 +13,7 @@ from slipsweep.files import spec
 from slipsweep.files.jobs import limit_job
 from slipsweep.files.motions import read_embedded
 from slipsweep.files.opening import read_result
-from slipsweep.model.variables import DEFAULT_SUITE_RESULTS, MOTION_COORDINATES
+from slipsweep.model.variables import DEFAULT_RECORD_RESULTS, MOTION_COORDINATES
 from tests.studies.test_record_sweeps import assert_same_data, run
 from tests.support.commands import command
 
@@ -70,7 +70,7 @@ def test_a_sweep_file_gives_what_python_gives(folder: Path) -> None:
     with xr.open_dataset(folder / "a.nc", mask_and_scale=False) as result:
         assert result.permanent_displacement.dims == expected.permanent_displacement.dims
         assert result.motion.values.tolist() == ["m0", "m1", "m2"]
-        for name in (*DEFAULT_SUITE_RESULTS, *MOTION_COORDINATES):
+        for name in (*DEFAULT_RECORD_RESULTS, "motion_factor", *MOTION_COORDINATES):
             np.testing.assert_array_equal(result[name], expected[name], err_msg=name)
         np.testing.assert_array_equal(
             result.permanent_displacement.sel(motion="m1"), expected.permanent_displacement.sel(motion="m1")

@@ -69,7 +69,11 @@ class Job:
 
     def outline(self, command: str) -> xr.Dataset:
         """As `described`, but with lazy arrays where the results will stand."""
-        return self.described(self.plan.outline({}), command)
+        import dask.array as da  # takes as long as xarray: only for runs in chunks
+
+        template = self.plan.template()
+        zeros = {name: da.zeros(one.shape, dtype=one.dtype, chunks=-1) for name, one in template.data_vars.items()}
+        return self.described(template.copy(data=zeros), command)
 
 
 def sweep_job(spec: SweepSpec) -> Job:

@@ -85,29 +85,31 @@ class Plan:
             for _, one in self.tasks
         )
 
-    def outline(self, lengths: Mapping[str, tuple[int, ...]]) -> xr.Dataset:
-        """As `template`, but with lazy arrays, in chunks of these lengths along the dimensions of the grid."""
-        import dask.array as da  # takes as long as xarray: only for what is lazy
-
-        table, zeros = self.template(), {}
-        for name, one in table.data_vars.items():
-            chunked = [lengths.get(str(dim), -1) for dim in one.dims]
-            zeros[name] = da.zeros(one.shape, dtype=one.dtype, chunks=chunked)
-        return table.copy(data=zeros)
-
     def lazy(self, lengths: Mapping[str, tuple[int, ...]]) -> xr.Dataset:
         """The results as dask arrays in chunks of these lengths: nothing is computed before it is asked for."""
-        import dask.array as da
+        import dask.array as da  # takes as long as xarray
 
         if not lengths:  # one cell
-            return self.solve().chunk()
-        outline = self.outline(lengths)
-        blocks = {f"along {dim}": (dim, da.arange(sum(own), chunks=(own,))) for dim, own in lengths.items()}
-        # one task of the graph, which all chunks read
-        plan = da.from_array(np.array(self, object), name=False)
-        template = outline.drop_vars(outline.coords)
-        found = xr.map_blocks(_solved, xr.Dataset(blocks | {"plan": ((), plan)}), template=template)
-        return found.assign_coords(outline.coords)
+            return self.solve()
+        # an array with an element for each chunk of the grid, which is all its results: they come out of one task
+        ones = tuple((1,) * len(own) for own in lengths.values())
+        meta = np.empty((0,) * len(ones), object)
+        solved = da.map_blocks(_solved, plan=self, lengths=dict(lengths), chunks=ones, dtype=object, meta=meta)
+        table = self.template()
+        for name, result in table.data_vars.items():
+            # it has some dimensions of the grid, in their order, and perhaps others of its own after them
+            own = [dim for dim in result.dims if dim in lengths]
+            table[name].data = da.map_blocks(
+                _result,
+                solved[tuple(slice(None) if dim in own else slice(1) for dim in lengths)],
+                result=name,
+                drop_axis=[axis for axis, dim in enumerate(lengths) if dim not in own],
+                new_axis=[*range(len(own), result.ndim)],
+                chunks=tuple(lengths.get(str(dim), (size,)) for dim, size in result.sizes.items()),
+                dtype=result.dtype,
+                meta=np.empty((0,) * result.ndim, result.dtype),
+            )
+        return table
 
     def _table(self, results: Iterable[engine.Variables]) -> xr.Dataset:
         """The results of all tasks, described."""
@@ -116,11 +118,18 @@ class Plan:
         return xr.Dataset(table, self.coords, self.attrs)
 
 
-def _solved(block: xr.Dataset) -> xr.Dataset:
-    """The results of a chunk: `block` has the plan, and the places along each dimension that lie in the chunk."""
-    chunk = {str(dim): slice(int(block[f"along {dim}"][0]), int(block[f"along {dim}"][-1]) + 1) for dim in block.dims}
-    found = block["plan"].item().part(chunk).solve()
-    return found.drop_vars(found.coords)
+def _solved(plan: Plan, lengths: Mapping[str, tuple[int, ...]], block_id: tuple[int, ...]) -> np.ndarray:
+    """The results of a chunk as the element of an array."""
+    edges = zip(lengths.items(), block_id, strict=True)
+    chunk = {dim: slice(sum(own[:at]), sum(own[: at + 1])) for (dim, own), at in edges}
+    found = np.empty((1,) * len(block_id), object)
+    found.flat[0] = plan.part(chunk).solve()
+    return found
+
+
+def _result(chunk: np.ndarray, result: str) -> np.ndarray:
+    """One of the results that are the element of an array."""
+    return np.asarray(chunk.item()[result])
 
 
 def plan_sweep(
@@ -134,15 +143,10 @@ def plan_sweep(
     """Plan of a sweep; arguments and errors (InputError) are those of `slipsweep.sweep`."""
     problem = grid_inputs.check_problem(excitation, model, solver)
     coords = grid_inputs.check_parameters(problem, inputs)
-    results: dict[str, dict[str, Any]] = known.RECORD_RESULTS
-    default: tuple[str, ...] = known.DEFAULT_RECORD_RESULTS
-    title = "Response of a rigid block to a recorded motion"
-    if isinstance(problem.excitation, Waveform):
-        results, default = known.RESULTS, known.DEFAULT_RESULTS
-        title = "Permanent displacement of a rigid block, swept"
-    elif isinstance(problem.excitation, Suite):
-        default = known.DEFAULT_SUITE_RESULTS
-        title = "Response of a rigid block to a suite of recorded motions"
+    is_wave = isinstance(problem.excitation, Waveform)
+    results = known.RESULTS if is_wave else known.RECORD_RESULTS
+    default: tuple[str, ...] = known.DEFAULT_RESULTS if is_wave else known.DEFAULT_RECORD_RESULTS
+    default += ("motion_factor",) if isinstance(problem.excitation, Suite) else ()
     wanted = default if variables is None else check_choices("variables", variables, results)
     solved = grid_inputs.inputs_of(problem, coords)
     drive = _drive(solved)
@@ -166,7 +170,7 @@ def plan_sweep(
     if amplitude := tuple(name for name in ("amplitude", "motion_factor") if name in wanted and name not in coords):
         tasks.append(_task(engine.amplitudes, problem, amplitude, drive))
     names = tuple(name for name in wanted if any(name in request.wanted for _, request in tasks))
-    attrs = _about(title, problem, coords)
+    attrs = _about(problem, coords)
     return Plan(grid_inputs.grid_sizes(solved), coords, tuple(tasks), names, attrs, cost, memory=memory_of(problem))
 
 
@@ -217,15 +221,15 @@ def _friction_task(problem: grid_inputs.Problem, names: tuple[str, ...], inputs:
     return _task(engine.friction_parameters, problem, names, {name: one for name, one in inputs.items() if name in own})
 
 
-def _about(title: str, problem: grid_inputs.Problem, given: Collection[str]) -> dict[str, Any]:
+def _about(problem: grid_inputs.Problem, given: Collection[str]) -> dict[str, Any]:
     """What results say of themselves: the choices read back from it are those of the problem."""
-    inputs = {"friction_inputs": options.friction_inputs(problem.model.name, given, {})}
-    motion = problem.excitation
-    shaking: Mapping[str, Any]
+    motion, title = problem.excitation, "Response of a rigid block to a recorded motion"
     if isinstance(motion, Record):
         shaking = {"record": motion.name, **motion.attrs}
     elif isinstance(motion, Suite):
-        shaking = motion.attrs
+        title, shaking = "Response of a rigid block to a suite of recorded motions", {**motion.attrs}
     else:
+        title = "Permanent displacement of a rigid block, swept"
         shaking = WAVEFORMS.attributes(motion) | options.SOLVERS.attributes(problem.solver)
+    inputs = {"friction_inputs": options.friction_inputs(problem.model.name, given, {})}
     return {"title": title, **_SOURCE, **options.MODELS.attributes(problem.model), **inputs, **shaking}

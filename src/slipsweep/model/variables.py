@@ -345,10 +345,9 @@ RESULT_DTYPES: dict[str, str] = {
     **dict.fromkeys(RECORD_COUNTS, "int32"),
 }
 
-#: What `sweep` returns where no variables are named.
+#: What `sweep` returns where no variables are named; of a suite also the factor on each motion.
 DEFAULT_RESULTS = ("permanent_displacement", "peak_relative_velocity", "sliding_mode", "validity")
 DEFAULT_RECORD_RESULTS = ("permanent_displacement", "peak_relative_velocity", *RECORD_COUNTS, "validity")
-DEFAULT_SUITE_RESULTS = (*DEFAULT_RECORD_RESULTS, "motion_factor")
 
 #: The parameters of Eqs. 7-11.
 FRICTION_PARAMETERS = (
