@@ -226,21 +226,10 @@ def read_record(
     >>> slipsweep.read_record("sweeps/data/synthetic.csv")
     Record('sweeps/data/synthetic.csv': 2001 samples, 20 s, peak 3.432 m/s2)
     """
-    reading = Reading(
-        units=units, interval=interval, baseline=baseline, gaps=gaps, implausible=implausible, format=format,
-        channel=channel,
-    )  # fmt: skip
+    reading = Reading(units, interval, baseline, gaps, implausible, format, channel)
     path = Path(path)
     content, lines = formats.read_lines(path)
-    kind, (times, values, own) = formats.read_samples(path, lines, reading)
-    if own and units and UNITS[own] != UNITS[units]:
-        raise InputError(
-            f"{path}: units = {units!r}: the file itself says {own!r}; correct its header, or leave units out"
-        )
-    unit = own or units
-    if not unit:
-        known = ", ".join(map(repr, UNITS))
-        raise InputError(f"{path}: units: must be given, one of {known}: the file does not name the unit")
+    kind, times, values, unit = formats.read_samples(path, lines, reading)
     attrs = {"record": path.name, "record_format": kind, "record_sha256": hashlib.sha256(content).hexdigest()}
     if reading.channel is not None:
         attrs["record_channel"] = str(reading.channel)

@@ -280,10 +280,7 @@ def read_suite(
     >>> slipsweep.read_suite("sweeps/data/suite", pairs=("_H1", "_H2"))
     Suite('sweeps/data/suite': 4 pairs: rock-far, rock-near, soft-far, stiff-pulse)
     """
-    reading = Reading(
-        units=units, interval=interval, baseline=baseline, gaps=gaps, implausible=implausible, format=format,
-        channel=channel,
-    )  # fmt: skip
+    reading = Reading(units, interval, baseline, gaps, implausible, format, channel)
     return suite_in(Path(), paths, pairs, reading)
 
 
