@@ -209,13 +209,10 @@ def _rises(pieces: np.ndarray) -> NDArray[np.float64]:
     """`Wave.rises`: ranges are joined where they overlap."""
     first, last = pieces["first"], pieces["last"]
     rising = (first + last > 0.0) & ((last >= first) | pieces["jumps"])
-    joined: list[list[float]] = []
-    for low, high in sorted(zip(first[rising], np.maximum(first, last)[rising], strict=True)):
-        if joined and low <= joined[-1][1]:
-            joined[-1][1] = max(joined[-1][1], high)
-        else:
-            joined.append([low, high])
-    return np.array(joined, np.float64).reshape(-1, 2)
+    order = np.argsort(first[rising])
+    low, high = first[rising][order], np.maximum.accumulate(np.maximum(first, last)[rising][order])
+    apart = low[1:] > high[:-1]
+    return np.column_stack([low[np.append(True, apart)], high[np.append(apart, True)]])
 
 
 #: Tables of pieces that are kept, and bytes of a sample in one, about: a line through zero is two pieces.

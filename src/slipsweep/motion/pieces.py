@@ -56,10 +56,9 @@ def pieces_of(
     start: NDArray[Any], end: NDArray[Any], length: NDArray[Any], first: NDArray[Any], last: NDArray[Any],
     at_end: NDArray[Any], coefficients: NDArray[Any], arc: NDArray[Any],
 ) -> np.ndarray:  # fmt: skip
-    """The table of pieces, from the fields of these names.
+    """The table of pieces, from fields of these names; `length` is without the rounding of `start` and `end`.
 
-    `length` is that of a piece, which the difference of its ends would round; `at_end` is whether |w| is larger
-    at its end, its anchor then, and row i of `coefficients` are c₁, c₂, … of piece i from there.
+    `at_end` is whether |w| is larger at its end, its anchor then; row i of `coefficients` are c₁, c₂, … of piece i.
     """
     power = np.arange(1, coefficients.shape[1] + 1)
     top = np.where(at_end, last, first)
@@ -77,18 +76,12 @@ def pieces_of(
 
 
 def wave_of_pieces(pieces: np.ndarray, cycle: ArrayLike, shape: ArrayLike, lead: int = 0, repeats: int = 0) -> Wave:
-    """The wave of a table of pieces.
-
-    Its intervals are runs of pieces above zero; one that touches zero ends.  `rises` is left empty: a record has no use
-    for it.
-    """
+    """The wave of a table of pieces; an interval that touches zero ends.  `rises`, of no use to a record, is empty."""
     first, last = pieces["first"], pieces["last"]
-    above = np.concatenate([[False], first + last > 0.0, [False]])
-    touches = np.concatenate([[False], (last[:-1] == 0.0) & (first[1:] == 0.0), [False]])
-    starts = np.flatnonzero(above[1:-1] & (~above[:-2] | touches[:-1]))
-    ends = np.flatnonzero(above[1:-1] & (~above[2:] | touches[1:])) + 1
+    above, top = first + last > 0.0, np.maximum(first, last)
+    parted = ~(above[:-1] & above[1:]) | ((last[:-1] == 0.0) & (first[1:] == 0.0))  # from the next piece
+    starts, ends = np.flatnonzero(above & np.append(True, parted)), np.flatnonzero(above & np.append(parted, True)) + 1
     interval = np.column_stack([starts, ends]).astype(np.int64)
-    top = np.maximum(first, last)
     return Wave(
         pieces=pieces,
         cycle=np.asarray(cycle, np.int64),

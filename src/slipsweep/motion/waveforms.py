@@ -8,17 +8,11 @@ the first `ramp_in` cycles, and falls to 0 over the last `ramp_out`; A is the pe
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from slipsweep.errors import InputError
 from slipsweep.model.choices import Choice, Family, option
 from slipsweep.model.parameters import MOST_CYCLES, number_text
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-#: Largest multiple of a harmonic.
-MOST_MULTIPLE = 100
 
 
 @dataclass(frozen=True)
@@ -42,8 +36,8 @@ class Waveform(Choice):
 
     def __str__(self) -> str:
         """In words, as a caption has it: ``10 cycles of a triangle wave, ramp in 2 cycles``."""
-        given = {"in": self.ramp_in, "out": self.ramp_out}
-        ramps = "".join(f", ramp {word} {number_text(ramp)} cycles" for word, ramp in given.items() if ramp)
+        given = (("in", self.ramp_in), ("out", self.ramp_out))
+        ramps = "".join(f", ramp {word} {number_text(ramp)} cycles" for word, ramp in given if ramp)
         return f"{self.cycles} cycle{'s' if self.cycles > 1 else ''} of a {self._words()}{ramps}"
 
     def _words(self) -> str:
@@ -144,7 +138,7 @@ class Square(Waveform):
 @dataclass(frozen=True)
 class _Terms:  # a base of its own, as a field without a default comes first
     amplitudes: Sequence[float] = option("relative amplitudes of the harmonics")
-    multiples: Sequence[int] = option("multiples of the frequency of the harmonics", least=1, most=MOST_MULTIPLE)
+    multiples: Sequence[int] = option("multiples of the frequency of the harmonics", least=1, most=100)
     phases: Sequence[float] | None = option("phases of the harmonics, degrees", None)
 
 
@@ -208,7 +202,7 @@ WAVEFORMS: Family[Waveform] = Family(
 )
 
 
-def peak_acceleration(displacement_amplitude: "NDArray[Any]", frequency: "NDArray[Any]") -> "NDArray[Any]":
-    """A = (2πf)² d of a motion of peak displacement d (m), m/s²; the arrays broadcast."""
+def peak_acceleration(displacement_amplitude: Any, frequency: Any) -> Any:
+    """A = (2πf)² d of motions of peak displacement d (m), m/s²; the arrays broadcast."""
     omega = 2.0 * math.pi * frequency
     return omega * omega * displacement_amplitude
