@@ -9,13 +9,11 @@ from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.model.parameters import LARGEST, shown
+from slipsweep.motion.intensity import Floats
 from slipsweep.motion.reading import UNITS, Reading
-
-Floats = NDArray[np.float64]
 
 #: Other spellings of units in headers.
 _SPELLINGS = {"g's": "g", "gals": "gal", "cm/s/s": "cm/s2", "cm/sec2": "cm/s2", "m/s/s": "m/s2", "m/sec2": "m/s2"}
@@ -268,7 +266,7 @@ def read_columns(
     holds: Callable[[str, set[str], str], tuple[str, float] | None],
     needed: Sequence[str],
     example: str,
-) -> dict[str, NDArray[np.float64]]:
+) -> dict[str, Floats]:
     """Columns of numbers, by what they hold and in its unit; a blank cell is NaN (InputError: the line, and why).
 
     The first line that is not blank and does not begin with ``#`` names the columns.  Separators are tabs, semicolons
