@@ -20,6 +20,7 @@ _SPELLINGS = {"g's": "g", "gals": "gal", "cm/s/s": "cm/s2", "cm/sec2": "cm/s2", 
 
 _NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
 _COUNT = r"(\d{1,9})\b"
+_INTERVAL = rf"(?i)\b(?:dt|interval)\s*[=:]\s*{_NUMBER}"  # in the header of a file without times: ``dt = 0.01``
 
 #: What a file holds: times (s), accelerations in its own unit (NaN where blank), and that unit if it names one.
 Samples: TypeAlias = tuple[Floats, Floats, str | None]
@@ -59,7 +60,6 @@ def read_samples(path: Path, lines: list[str], reading: Reading) -> tuple[str, F
 
 
 def _format_of(lines: list[str], reading: Reading) -> str:
-    """The format of a file, from its header."""
     first = lines[0] if lines else ""
     if re.search(_COSMOS_HEAD, first, re.IGNORECASE):
         return "cosmos"
@@ -72,10 +72,6 @@ def _format_of(lines: list[str], reading: Reading) -> str:
     header, body = _header(lines)
     has_times = not body or len(_cells(body[0][1])) > 1
     return "csv" if has_times and reading.interval is None and not re.search(_INTERVAL, header) else "values"
-
-
-#: The sampling interval in the header of a file without times: ``dt = 0.01``.
-_INTERVAL = rf"(?i)\b(?:dt|interval)\s*[=:]\s*{_NUMBER}"
 
 
 def _csv(lines: list[str], reading: Reading) -> Samples:
@@ -282,12 +278,11 @@ def read_columns(
     columns: dict[str, tuple[int, float]] = {}
     for at, name in enumerate(names):
         text, _, unit = name.replace("[", "(").partition("(")
-        found = holds(name, {*re.split(r"[\s_\-]+", text.strip().lower())}, unit.strip(" )]"))
-        if found is None:
-            continue
-        if found[0] in columns:
-            raise InputError(f"{path}: line {number}: two columns are {found[0]}: must be one")
-        columns[found[0]] = at, found[1]
+        what, factor = holds(name, {*re.split(r"[\s_\-]+", text.strip().lower())}, unit.strip(" )]")) or ("", 0.0)
+        if what in columns:
+            raise InputError(f"{path}: line {number}: two columns are {what}: must be one")
+        if what:
+            columns[what] = at, factor
     for what in needed:
         if what not in columns:
             raise InputError(f"{path}: line {number}: no column {what}: must name its columns, such as {example}")

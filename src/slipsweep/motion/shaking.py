@@ -113,7 +113,7 @@ def check_channels(key: str, given: Any, known: Collection[str]) -> tuple[str, .
 def read_test(path: str | Path) -> ShakingTest:
     """Read a test from a CSV file whose header names columns and units (`read_columns`); "g" is standard gravity.
 
-    Columns of other names than ``time (s), table acceleration (g), relative displacement (mm)`` are left out.
+    Such as ``time (s), table acceleration (g), relative displacement (mm)``.  Columns of other names are left out.
     InputError: the file cannot be read, a column has no unit, or a line holds no numbers.
     """
     path = Path(path)

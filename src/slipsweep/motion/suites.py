@@ -1,7 +1,7 @@
 """Suites of recorded motions: read together, told apart by labels, of any length and sampling."""
 
 import glob
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,9 +18,6 @@ from slipsweep.model.variables import INTENSITY_MEASURES
 from slipsweep.motion.intensity import Floats, intensity_measures
 from slipsweep.motion.reading import Baseline, Format, Gaps, Implausible, Reading, Unit
 from slipsweep.motion.records import Record, read_record
-
-#: Samples of the two components of a pair are at one time if they are nearer than this part of an interval.
-_SAME_TIME = 1e-6
 
 
 @dataclass(frozen=True)
@@ -46,11 +43,9 @@ class Pair:
     Examples
     --------
     >>> import slipsweep
-    >>> first, second = (
-    ...     slipsweep.Record.sampled(values, 0.1, name) for name, values in (("NS", [0, 3, 0]), ("EW", [0, 4, 0]))
-    ... )
-    >>> slipsweep.Pair(first, second).rotated(90)
-    Record('NS, EW at 90 degrees': 3 samples, 0.2 s, peak 4 m/s2)
+    >>> north, east = (slipsweep.Record.sampled([0, peak, 0], 0.1, f"{peak} m/s2") for peak in (3, 4))
+    >>> slipsweep.Pair(north, east).rotated(90)
+    Record('3 m/s2, 4 m/s2 at 90 degrees': 3 samples, 0.2 s, peak 4 m/s2)
     """
 
     first: Record
@@ -61,7 +56,7 @@ class Pair:
             if not isinstance(own, Record):
                 raise InputError(f"{name} = {shown(own)}: must be a Record, one component of a motion")
         times, other = sorted((self.first.times, self.second.times), key=np.size, reverse=True)
-        if np.abs(times[: other.size] - other).max() > _SAME_TIME * np.diff(other).min():
+        if np.abs(times[: other.size] - other).max() > 1e-6 * np.diff(other).min():  # but for rounding in their files
             raise InputError(f"{self.name}: the components of a pair must be sampled at the same times")
         for name, own in (("first", self.first), ("second", self.second)):
             filled = np.append(own.acceleration, np.zeros(times.size - own.times.size))
@@ -93,6 +88,7 @@ class Pair:
 
 
 Motion: TypeAlias = Record | Pair
+_Source: TypeAlias = tuple[Path | Record, ...]  # what a motion is read from: one part, or the components of a pair
 
 
 @dataclass(frozen=True, repr=False)
@@ -185,10 +181,11 @@ class Suite:
     @cached_property
     def duplicates(self) -> tuple[tuple[str, ...], ...]:
         """Labels of motions that have the same samples, such as one file under two names."""
-        alike: dict[bytes, list[str]] = {}
+        alike = defaultdict[bytes, list[str]](list)
         for label, motion in zip(self.labels, self, strict=True):
-            samples = b"".join(one.acceleration.tobytes() + one.times.tobytes() for one in _components(motion))
-            alike.setdefault(samples, []).append(label)
+            alike[b"".join(one.acceleration.tobytes() + one.times.tobytes() for one in _components(motion))].append(
+                label
+            )
         return tuple(tuple(labels) for labels in alike.values() if len(labels) > 1)
 
     @cached_property
@@ -282,10 +279,6 @@ def read_suite(
     """
     reading = Reading(units, interval, baseline, gaps, implausible, format, channel)
     return suite_in(Path(), paths, pairs, reading)
-
-
-#: What a motion is read from: one part, or the two components of a pair.
-_Source: TypeAlias = tuple[Path | Record, ...]
 
 
 def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Reading) -> Suite:
