@@ -13,12 +13,12 @@ from slipsweep.errors import InputError
 from slipsweep.model.parameters import LARGEST, check_choice, check_numbers, check_single, shown
 from slipsweep.motion import formats
 from slipsweep.motion.inspection import drift, odd_peak, without_fill_values
-from slipsweep.motion.intensity import Floats, peak_velocity
+from slipsweep.motion.intensity import Floats, Motion, peak_velocity
 from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS, Baseline, Format, Gaps, Implausible, Reading, Unit
 
 
 @dataclass(frozen=True, eq=False)
-class Record:
+class Record(Motion):
     """A recorded acceleration, interpolated linearly between samples.
 
     Attributes
@@ -49,8 +49,6 @@ class Record:
     Record('short': 5 samples, 0.4 s, peak 2 m/s2)
     """
 
-    times: Floats
-    acceleration: Floats
     name: str = "record"
     attrs: dict[str, str] = field(default_factory=dict)
 
@@ -129,9 +127,8 @@ class Record:
 
     def corrected(self, baseline: Baseline) -> "Record":
         """The record less a constant ("mean") or a straight line ("linear", least squares); "none" leaves it."""
-        degree = {"none": None, "mean": 0, "linear": 1}[check_choice("baseline", baseline, ("none", "mean", "linear"))]
-        values = self.acceleration
-        if degree is not None:
+        degrees, values = {"none": None, "mean": 0, "linear": 1}, self.acceleration
+        if (degree := degrees[check_choice("baseline", baseline, degrees)]) is not None:
             values = values - np.polynomial.Polynomial.fit(self.times, values, degree)(self.times)
         return replace(self, acceleration=values, attrs=self.attrs | {"baseline": baseline})
 

@@ -292,12 +292,12 @@ def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Rea
         try:
             records[part] = part if isinstance(part, Record) else read_record(part, **reading.options)
         except InputError as error:
-            reasons[part] = str(error).removeprefix(f"{part}: ")
+            reasons[part] = str(error)
     if reasons:
         names = ", ".join(part.name for part in reasons)
         refused = InputError(f"{len(reasons)} of {len(reasons) + len(records)} files cannot be read: {names}")
-        for part, reason in reasons.items():
-            refused.add_note(f"{part}: {reason}")
+        for reason in reasons.values():
+            refused.add_note(reason)
         raise refused
     found = [[records[part] for part in source] for source in sources]
     motions = tuple(Pair(*parts) if len(parts) == 2 else parts[0] for parts in found)
