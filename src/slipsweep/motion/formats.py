@@ -267,9 +267,8 @@ def read_columns(
 
     The first line that is not blank and does not begin with ``#`` names the columns.  Separators are tabs, semicolons
     or commas: the first of these that is in it.  Commas that do not separate are decimal.
-    ``holds(name, words, unit)`` gives what the column of a name holds, from its words and the unit in brackets behind
-    them, and the factor to its unit; None where the column is left out.  `needed` is what there must be, `example` a
-    line of names for errors.
+    ``holds(name, words, unit)`` gives what a column holds, from the words of its name and the unit in brackets behind
+    them, and the factor to its unit; None leaves it out.  `needed` must be there, as in `example`, a line of names.
     """
     rows = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
     number, header = rows[0] if rows else (1, "")

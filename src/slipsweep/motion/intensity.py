@@ -154,5 +154,4 @@ def _zeros(curve: "PPoly") -> Floats:
 
 
 def _largest(curve: "PPoly", derivative: "PPoly") -> float:
-    """The largest magnitude of a curve."""
     return float(np.abs(curve(np.concatenate([curve.x, _zeros(derivative)]))).max())

@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike
 
 from slipsweep.errors import InputError
 from slipsweep.model.parameters import LARGEST, check_choice, check_numbers, check_single, shown
-from slipsweep.motion import formats
-from slipsweep.motion.inspection import drift, odd_peak, without_fill_values
+from slipsweep.motion import formats, inspection
 from slipsweep.motion.intensity import Floats, Motion, peak_velocity
 from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS, Baseline, Format, Gaps, Implausible, Reading, Unit
 
@@ -235,12 +234,12 @@ def read_record(
 
 def _inspected(name: str, times: Floats, values: Floats, unit: str, reading: Reading, attrs: dict[str, str]) -> Record:
     """The record of values in a unit; what is found in it is refused, unless `reading` accepts it."""
-    times, values, missing = without_fill_values(times, values)
+    times, values, missing = inspection.without_fill_values(times, values)
     if missing and reading.gaps == "refuse":
         raise InputError(f"{name}: {missing}: samples are missing; gaps = 'linear' interpolates between the others")
     record = Record(times, values * UNITS[unit], name, attrs | {"record_units": unit})
     record = record.corrected(reading.baseline)
-    odd = "; ".join(filter(None, (odd_peak(record, unit), drift(record))))
+    odd = "; ".join(filter(None, (inspection.odd_peak(record, unit), inspection.drift(record))))
     if odd and reading.implausible == "refuse":
         raise InputError(f"{name}: {odd}; or implausible = 'accept' takes the record as it is")
     accepted = "; ".join(filter(None, (missing, odd)))

@@ -52,13 +52,14 @@ class Pair:
     second: Record
 
     def __post_init__(self) -> None:
-        for name, own in (("first", self.first), ("second", self.second)):
+        components = {"first": self.first, "second": self.second}
+        for name, own in components.items():
             if not isinstance(own, Record):
                 raise InputError(f"{name} = {shown(own)}: must be a Record, one component of a motion")
         times, other = sorted((self.first.times, self.second.times), key=np.size, reverse=True)
         if np.abs(times[: other.size] - other).max() > 1e-6 * np.diff(other).min():  # but for rounding in their files
             raise InputError(f"{self.name}: the components of a pair must be sampled at the same times")
-        for name, own in (("first", self.first), ("second", self.second)):
+        for name, own in components.items():
             filled = np.append(own.acceleration, np.zeros(times.size - own.times.size))
             object.__setattr__(self, name, replace(own, times=times, acceleration=filled))
 
@@ -333,15 +334,13 @@ def _sources(given: Any, folder: Path) -> list[_Source]:
 
 
 def _matching(folder: Path, entry: str | Path) -> list[Path]:
-    """The files that an entry names."""
     path, pattern = folder / entry, str(entry)
     if path.is_dir():
         pattern = f"{glob.escape(pattern)}/*"
     elif path.exists() or not glob.has_magic(pattern):
         return [path]
-    found = (folder / one for one in glob.iglob(pattern, root_dir=folder, recursive=True))
-    files = sorted(one for one in found if one.is_file())
-    if not files:
+    names = glob.iglob(pattern, root_dir=folder, recursive=True)
+    if not (files := sorted(file for name in names if (file := folder / name).is_file())):
         what = "a folder without files" if path.is_dir() else "no file fits this pattern"
         raise InputError(f"paths: {entry}: {what}")
     return files
