@@ -38,7 +38,7 @@ class Wave(NamedTuple):
 
 def pieces_of(
     start: NDArray[Any], end: NDArray[Any], length: NDArray[Any], first: NDArray[Any], last: NDArray[Any],
-    at_end: NDArray[Any], coefficients: NDArray[Any], arc: NDArray[Any],
+    at_end: NDArray[Any], coefficients: NDArray[Any], arc: NDArray[Any] | bool = False,
 ) -> np.ndarray:  # fmt: skip
     """The table of pieces.  On one of them w = top + c₁τ + c₂τ² + …, τ from its anchor, its end where |w| is larger.
 
