@@ -77,7 +77,7 @@ class ShakingTest:
 
         Constants and lines are fitted to the samples between the two times of `rest` (s), when the table and the block
         were at rest.  Without it they are fitted to all samples, which is right for accelerations of a motion that
-        begins and ends at rest.  Also returns a line on what was taken off each: its value at the first sample.
+        begins and ends at rest.  Also returns what was taken off each: its value at the first sample, and its slope.
         """
         offset, drift = (check_channels(*one, self.channels) for one in (("offset", offset), ("drift", drift)))
         chosen = np.ones(self.times.size, dtype=bool)
@@ -94,7 +94,8 @@ class ShakingTest:
                 raise InputError(f"{within}{name}: {use.sum()} samples to fit its offset to: must be at least 3")
             line = np.polynomial.Polynomial.fit(since[use], channels[name][use], 1 if name in drift else 0)
             channels[name] = channels[name] - line(since)
-            (constant, slope), unit = (float(one(0.0)) for one in (line, line.deriv())), HISTORY[name]["units"]
+            constant, slope = (float(one(0.0)) for one in (line, line.deriv()))
+            unit = HISTORY[name]["units"]
             removed.append(f"{name}: {constant:.4g} {unit}" + (f" and {slope:.4g} {unit} a second" if slope else ""))
         return replace(self, channels=channels), removed
 

@@ -285,8 +285,7 @@ def read_suite(
 def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Reading) -> Suite:
     """`read_suite` of paths that are relative to a folder, whatever letters its own name has."""
     sources = _sources(paths, folder)
-    if pairs is not None:
-        sources = _paired(sources, pairs)
+    sources, labels = (sources, ()) if pairs is None else _paired(sources, pairs)
     records: dict[Path | Record, Record] = {}
     reasons = {}
     for part in dict.fromkeys(chain.from_iterable(sources)):
@@ -302,10 +301,6 @@ def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Rea
         raise refused
     found = [[records[part] for part in source] for source in sources]
     motions = tuple(Pair(*parts) if len(parts) == 2 else parts[0] for parts in found)
-    labels: tuple[str, ...] = ()
-    if pairs is not None:
-        firsts = [Path(first.name) for first, _ in found]
-        labels = _labels([one.with_name(one.stem.removesuffix(pairs[0]).rstrip("_-. ") or one.stem) for one in firsts])
     entry = paths[0] if isinstance(paths, (list, tuple)) and len(paths) == 1 else paths
     return Suite(motions, labels, str(entry) if isinstance(entry, (str, Path)) else "suite")
 
@@ -346,8 +341,8 @@ def _matching(folder: Path, entry: str | Path) -> list[Path]:
     return files
 
 
-def _paired(sources: Sequence[_Source], endings: Sequence[str]) -> list[_Source]:
-    """Files put together two by two."""
+def _paired(sources: Sequence[_Source], endings: Sequence[str]) -> tuple[list[_Source], tuple[str, ...]]:
+    """Files put together two by two, and the labels of the pairs: what the names of both files begin with."""
     texts = [one for one in check_list("pairs", endings, "two endings of names") if isinstance(one, str) and one]
     if len(texts) != len(endings) or len({*texts}) != 2:
         raise InputError(f"pairs = {shown(endings)}: must be two different endings of names, such as ('_NS', '_EW')")
@@ -361,7 +356,8 @@ def _paired(sources: Sequence[_Source], endings: Sequence[str]) -> list[_Source]
     whole = {one for pair in pairs.items() for one in pair if {*pair} <= {*parts}}
     if incomplete := ", ".join(one.name for one in parts if one not in whole):
         raise InputError(f"pairs = {shown(endings)}: without the other component: {incomplete}")
-    return list(pairs.items())
+    stems = [one.with_name(one.stem.removesuffix(first).rstrip("_-. ") or one.stem) for one in pairs]
+    return list(pairs.items()), _labels(stems)
 
 
 def _labels(paths: Sequence[Path]) -> tuple[str, ...]:
