@@ -74,7 +74,8 @@ def wave_of_pieces(pieces: np.ndarray, cycle: ArrayLike, shape: ArrayLike, lead:
     first, last = pieces["first"], pieces["last"]
     above, top = first + last > 0.0, np.maximum(first, last)
     parted = ~(above[:-1] & above[1:]) | ((last[:-1] == 0.0) & (first[1:] == 0.0))  # from the next piece
-    starts, ends = np.flatnonzero(above & np.append(True, parted)), np.flatnonzero(above & np.append(parted, True)) + 1
+    starts = np.flatnonzero(above & np.append(True, parted))
+    ends = np.flatnonzero(above & np.append(parted, True)) + 1
     interval = np.column_stack([starts, ends]).astype(np.int64)
     return Wave(
         pieces=pieces,

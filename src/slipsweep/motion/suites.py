@@ -43,9 +43,9 @@ class Pair:
     Examples
     --------
     >>> import slipsweep
-    >>> north, east = (slipsweep.Record.sampled([0, peak, 0], 0.1, f"{peak} m/s2") for peak in (3, 4))
-    >>> slipsweep.Pair(north, east).rotated(90)
-    Record('3 m/s2, 4 m/s2 at 90 degrees': 3 samples, 0.2 s, peak 4 m/s2)
+    >>> first, second = (slipsweep.Record.sampled([0, one, 0], 0.1, name) for one, name in ((3, "NS"), (4, "EW")))
+    >>> slipsweep.Pair(first, second).rotated(90)
+    Record('NS, EW at 90 degrees': 3 samples, 0.2 s, peak 4 m/s2)
     """
 
     first: Record
@@ -57,7 +57,8 @@ class Pair:
             if not isinstance(own, Record):
                 raise InputError(f"{name} = {shown(own)}: must be a Record, one component of a motion")
         times, other = sorted((self.first.times, self.second.times), key=np.size, reverse=True)
-        if np.abs(times[: other.size] - other).max() > 1e-6 * np.diff(other).min():  # but for rounding in their files
+        # files round times: to the millionth part of an interval they are the same
+        if np.abs(times[: other.size] - other).max() > 1e-6 * np.diff(other).min():
             raise InputError(f"{self.name}: the components of a pair must be sampled at the same times")
         for name, own in components.items():
             filled = np.append(own.acceleration, np.zeros(times.size - own.times.size))
@@ -184,9 +185,8 @@ class Suite:
         """Labels of motions that have the same samples, such as one file under two names."""
         alike = defaultdict[bytes, list[str]](list)
         for label, motion in zip(self.labels, self, strict=True):
-            alike[b"".join(one.acceleration.tobytes() + one.times.tobytes() for one in _components(motion))].append(
-                label
-            )
+            samples = b"".join(one.acceleration.tobytes() + one.times.tobytes() for one in _components(motion))
+            alike[samples].append(label)
         return tuple(tuple(labels) for labels in alike.values() if len(labels) > 1)
 
     @cached_property
