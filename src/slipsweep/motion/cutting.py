@@ -1,4 +1,4 @@
-"""A waveform, or a record, cut into the pieces that the solvers go through (`pieces.Wave`); they are of no cell.
+"""A waveform, or a record, cut into the pieces that the solvers go through (`pieces.Wave`).
 
 The shaking is cut where w jumps, bends, turns and passes 0, so that w is monotone, smooth and of one sign on each piece
 (and further where a smooth one would be too long for its polynomial).  From the end of a piece to the beginning of the
@@ -43,15 +43,13 @@ Derivative = Callable[[Exact, int], Exact]
 
 @functools.lru_cache
 def _period(waveform: Waveform) -> tuple[Sequence[float], Sequence[Derivative], int]:
-    """One cycle of a waveform without ramps; phases are parts of the cycle.
+    """Where a cycle without ramps breaks, what gives the derivatives of w behind each break, the fastest multiple.
 
-    Where it breaks; what gives the derivatives of w by phase, in radians, at places behind each break, where w is
-    smooth; the multiple of the fastest harmonic, 0 where w is straight.
+    Places are parts of the cycle, derivatives are by phase in radians; the multiple is 0 where w is straight.
     """
     quarters = (0.0, 0.25, 0.5, 0.75, 1.0)
     if waveform.name == "triangle":
-        lines = zip(quarters, (0, 1, 0, -1), (4, -4, -4, 4), strict=False)
-        return quarters, [_line(at, w, slope) for at, w, slope in lines], 0
+        return quarters, [*map(_line, quarters, (0, 1, 0, -1), (4, -4, -4, 4))], 0
     if waveform.name == "square":
         return (0.0, 0.5, 1.0), [_line(0.0, 1.0, 0.0), _line(0.5, -1.0, 0.0)], 0
     if not isinstance(waveform, Harmonics):
@@ -209,13 +207,10 @@ def _rises(pieces: np.ndarray) -> NDArray[np.float64]:
     """`Wave.rises`: ranges are joined where they overlap."""
     first, last = pieces["first"], pieces["last"]
     rising = (first + last > 0.0) & ((last >= first) | pieces["jumps"])
-    joined: list[list[float]] = []
-    for low, high in sorted(zip(first[rising], np.maximum(first, last)[rising], strict=True)):
-        if joined and low <= joined[-1][1]:
-            joined[-1][1] = max(joined[-1][1], high)
-        else:
-            joined.append([low, high])
-    return np.array(joined, np.float64).reshape(-1, 2)
+    order = np.argsort(first[rising])
+    low, high = first[rising][order], np.maximum.accumulate(np.maximum(first, last)[rising][order])
+    apart = low[1:] > high[:-1]
+    return np.column_stack([low[np.append(True, apart)], high[np.append(apart, True)]])
 
 
 #: Tables of pieces that are kept, and bytes of a sample in one, about: a line through zero is two pieces.
@@ -243,6 +238,5 @@ def wave_of_record(record: Record, polarity: float) -> Wave:
         last=last,
         at_end=np.abs(last) > np.abs(first),
         coefficients=np.where(first == last, 0.0, (change / spacing)[own])[:, np.newaxis],
-        arc=np.zeros(own.size, np.bool_),
     )
     return wave_of_pieces(pieces, cycle=[0, own.size], shape=[0])  # each pulse of a record has its own rises

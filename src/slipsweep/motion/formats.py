@@ -9,19 +9,18 @@ from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.model.parameters import LARGEST, shown
+from slipsweep.motion.intensity import Floats
 from slipsweep.motion.reading import UNITS, Reading
-
-Floats = NDArray[np.float64]
 
 #: Other spellings of units in headers.
 _SPELLINGS = {"g's": "g", "gals": "gal", "cm/s/s": "cm/s2", "cm/sec2": "cm/s2", "m/s/s": "m/s2", "m/sec2": "m/s2"}
 
 _NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
 _COUNT = r"(\d{1,9})\b"
+_INTERVAL = rf"(?i)\b(?:dt|interval)\s*[=:]\s*{_NUMBER}"  # in the header of a file without times: ``dt = 0.01``
 
 #: What a file holds: times (s), accelerations in its own unit (NaN where blank), and that unit if it names one.
 Samples: TypeAlias = tuple[Floats, Floats, str | None]
@@ -37,19 +36,30 @@ def read_lines(path: Path) -> tuple[bytes, list[str]]:
     return content, content.decode("utf-8-sig", errors="replace").splitlines()
 
 
-def read_samples(path: Path, lines: list[str], reading: Reading) -> tuple[str, Samples]:
-    """The name of a file's format, and what the file holds (InputError: not of that format)."""
+def read_samples(path: Path, lines: list[str], reading: Reading) -> tuple[str, Floats, Floats, str]:
+    """The name of a file's format, its times (s), and its accelerations and their unit (InputError: it has none)."""
     kind = _format_of(lines, reading) if reading.format == "auto" else reading.format
-    if kind != "cosmos" and reading.channel is not None:
-        raise InputError(f"{path}: channel = {reading.channel}: only COSMOS files hold several; this one is {kind}")
-    if kind != "values" and reading.interval is not None:
-        raise InputError(f"{path}: interval = {reading.interval:g}: only for a file without times; this one is {kind}")
     read = {"csv": _csv, "values": _values, "at2": _at2, "esm": _esm, "knet": _knet, "cosmos": _cosmos}[kind]
-    return kind, read(path, lines, reading)
+    try:
+        if kind != "cosmos" and reading.channel is not None:
+            raise InputError(f"channel = {reading.channel}: only COSMOS files hold several; this one is {kind}")
+        if kind != "values" and reading.interval is not None:
+            raise InputError(f"interval = {reading.interval:g}: only for a file without times; this one is {kind}")
+        times, values, own = read(lines, reading)
+        if own and reading.units and UNITS[own] != UNITS[reading.units]:
+            given = f"units = {reading.units!r}"
+            raise InputError(f"{given}: the file itself says {own!r}; correct its header, or leave units out")
+        unit = own or reading.units
+        if not unit:
+            known = ", ".join(map(repr, UNITS))
+            raise InputError(f"units: must be given, one of {known}: the file does not name the unit")
+        return kind, times, values, unit
+    except InputError as error:
+        error.args = (f"{path}: {error}",)
+        raise
 
 
 def _format_of(lines: list[str], reading: Reading) -> str:
-    """The format of a file, from its header."""
     first = lines[0] if lines else ""
     if re.search(_COSMOS_HEAD, first, re.IGNORECASE):
         return "cosmos"
@@ -64,38 +74,34 @@ def _format_of(lines: list[str], reading: Reading) -> str:
     return "csv" if has_times and reading.interval is None and not re.search(_INTERVAL, header) else "values"
 
 
-#: The sampling interval in the header of a file without times: ``dt = 0.01``.
-_INTERVAL = rf"(?i)\b(?:dt|interval)\s*[=:]\s*{_NUMBER}"
-
-
-def _csv(path: Path, lines: list[str], reading: Reading) -> Samples:
+def _csv(lines: list[str], reading: Reading) -> Samples:
     header, body = _header(lines)
     if not body:
-        raise InputError(f"{path}: no line of a time and an acceleration")
+        raise InputError("no line of a time and an acceleration")
 
     def two(line: str) -> list[str]:
         time, value = _cells(line)
         return [time, value or "nan"]
 
-    times, values = _numbers(path, body, two, "a time and an acceleration").reshape(-1, 2).T
+    times, values = _numbers(body, two, "a time and an acceleration").reshape(-1, 2).T
     return times, values, _unit_in(header)
 
 
-def _values(path: Path, lines: list[str], reading: Reading) -> Samples:
+def _values(lines: list[str], reading: Reading) -> Samples:
     header, body = _header(lines)
     found = re.search(_INTERVAL, header)
     own = float(found[1]) if found else None
     step = reading.interval or own
     if step is None:
-        raise InputError(f"{path}: interval: must be given, s: the file has accelerations alone, without times")
+        raise InputError("interval: must be given, s: the file has accelerations alone, without times")
     if own and step != own:
-        raise InputError(f"{path}: interval = {step:g}: the file itself says {own:g}; leave interval out")
+        raise InputError(f"interval = {step:g}: the file itself says {own:g}; leave interval out")
     # in a single column of 0,123 commas are decimal, elsewhere as in any line
     decimal = all(re.fullmatch(r"\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*", line) for _, line in body)
-    values = _numbers(path, body, lambda line: [line.replace(",", ".")] if decimal else filter(None, _cells(line)))
+    values = _numbers(body, lambda line: [line.replace(",", ".")] if decimal else filter(None, _cells(line)))
     if values.size == 2 * len(body) > 2 and (np.diff(values[::2]) > 0.0).all():
-        raise InputError(f"{path}: interval = {step:g}: the first of two columns is that of times; leave interval out")
-    return _even(path, values, step, _unit_in(header))
+        raise InputError(f"interval = {step:g}: the first of two columns is that of times; leave interval out")
+    return _even(values, step, _unit_in(header))
 
 
 def _header(lines: list[str]) -> tuple[str, list[tuple[int, str]]]:
@@ -118,45 +124,42 @@ def _cells(line: str) -> list[str]:
 
 def _unit_in(header: str) -> str | None:
     """The unit of acceleration that a header gives in brackets, the last if there are several."""
-    found = None
-    for text in re.findall(r"[(\[]\s*([^)\]]+?)\s*[)\]]", header):
-        unit = re.sub(r"\s+|\^|\*\*", "", text.lower()).replace("²", "2").replace("s-2", "/s2")
-        unit = _SPELLINGS.get(unit, unit)
-        found = unit if unit in UNITS else found
-    return found
+    texts = re.findall(r"[(\[]\s*([^)\]]+?)\s*[)\]]", header.lower())
+    units = [re.sub(r"\s+|\^|\*\*", "", text).replace("²", "2").replace("s-2", "/s2") for text in texts]
+    return next((unit for one in reversed(units) if (unit := _SPELLINGS.get(one, one)) in UNITS), None)
 
 
-def _at2(path: Path, lines: list[str], reading: Reading) -> Samples:
+def _at2(lines: list[str], reading: Reading) -> Samples:
     at = next((at for at, line in enumerate(lines[:6]) if "NPTS" in line.upper()), 0)
     if re.search("VELOCITY|DISPLACEMENT", "\n".join(lines[:at]), re.IGNORECASE):
-        raise InputError(f"{path}: its header speaks of velocity or displacement: must be an acceleration (.AT2)")
+        raise InputError("its header speaks of velocity or displacement: must be an acceleration (.AT2)")
     # in files of the first database "4096  0.0100  NPTS, DT"
     line = re.sub(rf"(?i)^\s*{_COUNT}\s+{_NUMBER}\s+NPTS,\s*DT", r"NPTS=\1, DT=\2", "".join(lines[at : at + 1]))
-    points, interval = _fields(path, line, {"NPTS=": rf"NPTS\s*=\s*{_COUNT}", "DT=": rf"DT\s*=\s*{_NUMBER}"})
-    values = _numbers(path, enumerate(lines[at + 1 :], at + 2))
-    return _even(path, values, float(interval), "g", int(points))
+    points, interval = _fields(line, {"NPTS=": rf"NPTS\s*=\s*{_COUNT}", "DT=": rf"DT\s*=\s*{_NUMBER}"})
+    values = _numbers(enumerate(lines[at + 1 :], at + 2))
+    return _even(values, float(interval), "g", int(points))
 
 
-def _esm(path: Path, lines: list[str], reading: Reading) -> Samples:
+def _esm(lines: list[str], reading: Reading) -> Samples:
     at = next((at for at, line in enumerate(lines) if ":" not in line), len(lines))
     known = {"SAMPLING_INTERVAL_S": _NUMBER, "NDATA": _COUNT, "UNITS": r"(\S+)"}
     patterns = {name: rf"^{name}:\s*{pattern}\s*$" for name, pattern in known.items()}
-    interval, points, unit = _fields(path, "\n".join(lines[:at]), patterns)
+    interval, points, unit = _fields("\n".join(lines[:at]), patterns)
     unit = unit.lower().replace("^", "")
     if unit not in UNITS:
-        raise InputError(f"{path}: UNITS = {shown(unit)}: must be one of {', '.join(map(repr, UNITS))}")
-    return _even(path, _numbers(path, enumerate(lines[at:], at + 1)), float(interval), unit, int(points))
+        raise InputError(f"UNITS = {shown(unit)}: must be one of {', '.join(map(repr, UNITS))}")
+    return _even(_numbers(enumerate(lines[at:], at + 1)), float(interval), unit, int(points))
 
 
-def _knet(path: Path, lines: list[str], reading: Reading) -> Samples:
+def _knet(lines: list[str], reading: Reading) -> Samples:
     at = next((at for at, line in enumerate(lines[:40]) if line.startswith("Memo")), 0)
     known = {"Sampling Freq(Hz)": _NUMBER, "Duration Time(s)": _NUMBER, "Scale Factor": rf"{_NUMBER}\(gal\)/{_NUMBER}"}
     patterns = {name: rf"^{re.escape(name)}\s*{pattern}" for name, pattern in known.items()}
-    frequency, duration, gals, counts = map(float, _fields(path, "\n".join(lines[:at]), patterns))
+    frequency, duration, gals, counts = map(float, _fields("\n".join(lines[:at]), patterns))
     if not (0.0 < frequency < 1e6 and 0.0 < counts <= LARGEST and 0.0 < gals <= LARGEST):
-        raise InputError(f"{path}: {frequency:g} Hz, {gals:g} gal, {counts:g} counts: must be > 0")
-    values = _numbers(path, enumerate(lines[at + 1 :], at + 2)) * (gals / counts)
-    return _even(path, values, 1.0 / frequency, "gal", round(min(duration * frequency, 1e9)))
+        raise InputError(f"{frequency:g} Hz, {gals:g} gal, {counts:g} counts: must be > 0")
+    values = _numbers(enumerate(lines[at + 1 :], at + 2)) * (gals / counts)
+    return _even(values, 1.0 / frequency, "gal", round(min(duration * frequency, 1e9)))
 
 
 #: Codes of units that are accelerations (Table 2 of the format).
@@ -169,19 +172,19 @@ _COSMOS_HEADER = rf"^\s*{_COUNT}\s+%s-header values follow on\s+\d+\s+lines\s*,{
 _COSMOS_DATA = rf"^\s*{_COUNT}\s+\w+.*?\bpts?\b{_COSMOS_FORMAT}"
 
 
-def _cosmos(path: Path, lines: list[str], reading: Reading) -> Samples:
+def _cosmos(lines: list[str], reading: Reading) -> Samples:
     starts = [at for at, line in enumerate(lines) if re.search(_COSMOS_HEAD, line, re.IGNORECASE)]
-    read = (_cosmos_channel(path, lines[:end], at) for at, end in zip(starts, [*starts[1:], None], strict=False))
+    read = (_cosmos_channel(lines[:end], at) for at, end in zip(starts, [*starts[1:], None], strict=False))
     channels = [one for one in read if one is not None]
     if reading.channel is None and len(channels) > 1:
-        raise InputError(f"{path}: holds {len(channels)} channels of acceleration: give channel, from 1 on")
+        raise InputError(f"holds {len(channels)} channels of acceleration: give channel, from 1 on")
     number = reading.channel or 1
     if number > len(channels):
-        raise InputError(f"{path}: channel = {number}: it holds {len(channels)} channels of acceleration")
+        raise InputError(f"channel = {number}: it holds {len(channels)} channels of acceleration")
     return channels[number - 1]
 
 
-def _cosmos_channel(path: Path, lines: list[str], at: int) -> Samples | None:
+def _cosmos_channel(lines: list[str], at: int) -> Samples | None:
     """The channel that begins at a line and goes to the last one; None if it is no acceleration.
 
     Lines of text, 100 integers, 100 reals, comments, then values in a Fortran format, without blanks between them.
@@ -190,52 +193,49 @@ def _cosmos_channel(path: Path, lines: list[str], at: int) -> Samples | None:
     """
 
     def head(what: str, pattern: str) -> list[str]:
-        return _fields(path, "".join(lines[at : at + 1]), {what: pattern}, f"line {at + 1}")
+        return _fields("".join(lines[at : at + 1]), {what: pattern}, f"line {at + 1}")
 
     def section(what: str, pattern: str) -> tuple[int, Floats]:
         """The line after the values of a section, and these."""
         count, each, width = (int(number or 1) for number in head(what, pattern))
         end, column = at + 1 + -(-count // (each or 1)), f".{{1,{width or 1}}}"
         rows, numbers = enumerate(lines[at + 1 : end], at + 2), f"numbers, {width or 1} columns each"
-        values = _numbers(path, rows, lambda line: re.findall(column, line.rstrip()), numbers)
+        values = _numbers(rows, lambda line: re.findall(column, line.rstrip()), numbers)
         if values.size != count:
-            raise InputError(f"{path}: line {end}: {values.size} values, where {count} are announced")
+            raise InputError(f"line {end}: {values.size} values, where {count} are announced")
         return end, values
 
     at += int(*head("number of text lines", _COSMOS_HEAD))
     at, whole = section("integer header", _COSMOS_HEADER % "Integer")
     at, reals = section("real header", _COSMOS_HEADER % "Real")
     if whole.size < 3 or reals.size < 62:
-        raise InputError(f"{path}: line {at}: {whole.size} integers and {reals.size} reals: not enough")
+        raise InputError(f"line {at}: {whole.size} integers and {reals.size} reals: not enough")
     at += 1 + int(*head("number of comment lines", rf"^\s*{_COUNT}\s+Comment line"))
     at, values = section("number and format of values", _COSMOS_DATA)
     # what a V2 file may have behind the acceleration is its velocity and displacement
     if not any(line.lstrip().lower().startswith("end-of-data") for line in lines[at:]):
-        raise InputError(f"{path}: no line End-of-data after the values: cut off, or damaged")
+        raise InputError("no line End-of-data after the values: cut off, or damaged")
     if whole[1] != 1:
         return None
     if whole[2] not in _COSMOS_UNITS:
         known = ", ".join(f"{code} ({unit})" for code, unit in _COSMOS_UNITS.items())
-        raise InputError(f"{path}: code {whole[2]:.0f} for the unit of its values: must be one of {known}")
-    return _even(path, values, reals[61] / 1000.0, _COSMOS_UNITS[int(whole[2])])
+        raise InputError(f"code {whole[2]:.0f} for the unit of its values: must be one of {known}")
+    return _even(values, reals[61] / 1000.0, _COSMOS_UNITS[int(whole[2])])
 
 
-def _fields(path: Path, header: str, patterns: Mapping[str, str], where: str = "its header") -> list[str]:
+def _fields(header: str, patterns: Mapping[str, str], where: str = "its header") -> list[str]:
     """What patterns, by the names that errors have, find in a header (InputError: nothing)."""
     fields: list[str] = []
     for name, pattern in patterns.items():
         found = re.search(pattern, header, re.MULTILINE | re.IGNORECASE | re.ASCII)
         if found is None:
-            raise InputError(f"{path}: no {name} in {where}, or none that can be read: another format, or damaged")
+            raise InputError(f"no {name} in {where}, or none that can be read: another format, or damaged")
         fields += found.groups()
     return fields
 
 
 def _numbers(
-    path: Path,
-    lines: Iterable[tuple[int, str]],
-    cells: Callable[[str], Iterable[str]] = str.split,
-    what: str = "numbers",
+    lines: Iterable[tuple[int, str]], cells: Callable[[str], Iterable[str]] = str.split, what: str = "numbers"
 ) -> Floats:
     """All numbers in the cells of numbered lines, in their order."""
     values: list[float] = []
@@ -243,16 +243,16 @@ def _numbers(
         try:
             values.extend(map(float, cells(line)))
         except ValueError:
-            raise InputError(f"{path}: line {number}: {shown(line)}: must be {what}") from None
+            raise InputError(f"line {number}: {shown(line)}: must be {what}") from None
     return np.array(values)
 
 
-def _even(path: Path, values: Floats, interval: float, unit: str | None, points: int | None = None) -> Samples:
+def _even(values: Floats, interval: float, unit: str | None, points: int | None = None) -> Samples:
     """Evenly sampled values, whose header may say how many they are."""
     if points is not None and values.size != points:
-        raise InputError(f"{path}: {values.size} accelerations, where its header says {points}: cut off, or damaged")
+        raise InputError(f"{values.size} accelerations, where its header says {points}: cut off, or damaged")
     if not 0.0 < interval <= LARGEST:
-        raise InputError(f"{path}: sampling interval {interval:g}: must be a finite number > 0")
+        raise InputError(f"sampling interval {interval:g}: must be a finite number > 0")
     return np.arange(values.size, dtype=np.float64) * interval, values, unit
 
 
@@ -262,14 +262,13 @@ def read_columns(
     holds: Callable[[str, set[str], str], tuple[str, float] | None],
     needed: Sequence[str],
     example: str,
-) -> dict[str, NDArray[np.float64]]:
+) -> dict[str, Floats]:
     """Columns of numbers, by what they hold and in its unit; a blank cell is NaN (InputError: the line, and why).
 
     The first line that is not blank and does not begin with ``#`` names the columns.  Separators are tabs, semicolons
     or commas: the first of these that is in it.  Commas that do not separate are decimal.
-    ``holds(name, words, unit)`` gives what the column of a name holds, from its words and the unit in brackets behind
-    them, and the factor to its unit; None where the column is left out.  `needed` is what there must be, `example` a
-    line of names for errors.
+    ``holds(name, words, unit)`` gives what a column holds, from the words of its name and the unit in brackets behind
+    them, and the factor to its unit; None leaves it out.  `needed` must be there, as in `example`, a line of names.
     """
     rows = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
     number, header = rows[0] if rows else (1, "")
@@ -278,12 +277,11 @@ def read_columns(
     columns: dict[str, tuple[int, float]] = {}
     for at, name in enumerate(names):
         text, _, unit = name.replace("[", "(").partition("(")
-        found = holds(name, {*re.split(r"[\s_\-]+", text.strip().lower())}, unit.strip(" )]"))
-        if found is None:
-            continue
-        if found[0] in columns:
-            raise InputError(f"{path}: line {number}: two columns are {found[0]}: must be one")
-        columns[found[0]] = at, found[1]
+        what, factor = holds(name, {*re.split(r"[\s_\-]+", text.strip().lower())}, unit.strip(" )]")) or ("", 0.0)
+        if what in columns:
+            raise InputError(f"{path}: line {number}: two columns are {what}: must be one")
+        if what:
+            columns[what] = at, factor
     for what in needed:
         if what not in columns:
             raise InputError(f"{path}: line {number}: no column {what}: must name its columns, such as {example}")

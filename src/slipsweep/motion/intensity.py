@@ -8,7 +8,8 @@ acceleration but what `baseline` took off when it was read.  "g" is standard gra
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Protocol
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,13 +22,12 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
-class Motion(Protocol):
-    """A record, as far as measures are taken of it."""
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Samples of acceleration (m/s²) against time (s), as measures are taken of them."""
 
-    @property
-    def times(self) -> Floats: ...
-    @property
-    def acceleration(self) -> Floats: ...
+    times: Floats
+    acceleration: Floats
 
 
 #: Frequencies that the mean period is of, Hz, and their largest spacing (Rathje et al. 1998, 2004).
@@ -154,5 +154,4 @@ def _zeros(curve: "PPoly") -> Floats:
 
 
 def _largest(curve: "PPoly", derivative: "PPoly") -> float:
-    """The largest magnitude of a curve."""
     return float(np.abs(curve(np.concatenate([curve.x, _zeros(derivative)]))).max())

@@ -9,27 +9,11 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-#: A piece: a record of the fields of `piece_type`.
+#: A piece: a record of the fields that `pieces_of` names.
 Piece: TypeAlias = np.record
 
 #: Gauss-Legendre nodes on [0, 1], two SIMD registers.
 NODES, WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(16), (1.0, 0.0), strict=True))
-
-
-def piece_type(terms: int) -> np.dtype[Any]:
-    """The fields of a piece, τ counted from its anchor, that end of it where |w| is larger; w = top + c₁τ + c₂τ² + …
-
-    `start` and `end` are phases of the motion, `begin` and `finish` the same as τ (one of the two is 0); `first`,
-    `last` and `top` are w at the beginning, the end and the anchor.  The `degree` is 0 on a plateau and 1 on a straight
-    line; a piece `jumps` if w jumps up at its beginning, and is an `arc` if it is a quarter of a sine about its peak,
-    whose closed forms are shorter than its series.  c₁, c₂, … are `coefficients`, and `once` and `twice` those of the
-    sum's first and second integral from the anchor, of τ² and τ³ on.
-    """
-    numbers = ("start", "end", "begin", "finish", "first", "last", "top")
-    fields: list[Any] = [(name, np.float64) for name in numbers]
-    fields += [("degree", np.int64), ("jumps", np.bool_), ("arc", np.bool_)]
-    fields += [(name, np.float64, (terms,)) for name in ("coefficients", "once", "twice")]
-    return np.dtype((np.record, fields), align=True)
 
 
 class Wave(NamedTuple):
@@ -40,7 +24,7 @@ class Wave(NamedTuple):
     with w > 0.
     """
 
-    pieces: np.ndarray  # of `piece_type`
+    pieces: np.ndarray  # of `pieces_of`
     cycle: np.ndarray  # (cycles + 1,) the first piece of each cycle in the table
     shape: np.ndarray  # (cycles,) cycles of one number have the same pieces
     interval: np.ndarray  # (intervals, 2) its first piece, and the first after it
@@ -54,41 +38,45 @@ class Wave(NamedTuple):
 
 def pieces_of(
     start: NDArray[Any], end: NDArray[Any], length: NDArray[Any], first: NDArray[Any], last: NDArray[Any],
-    at_end: NDArray[Any], coefficients: NDArray[Any], arc: NDArray[Any],
+    at_end: NDArray[Any], coefficients: NDArray[Any], arc: NDArray[Any] | bool = False,
 ) -> np.ndarray:  # fmt: skip
-    """The table of pieces, from the fields of these names.
+    """The table of pieces.  On one of them w = top + c₁τ + c₂τ² + …, τ from its anchor, its end where |w| is larger.
 
-    `length` is that of a piece, which the difference of its ends would round; `at_end` is whether |w| is larger
-    at its end, its anchor then, and row i of `coefficients` are c₁, c₂, … of piece i from there.
+    `length` is without the rounding of `start` and `end`, `at_end` is where the anchor is, and `arc` whether a piece
+    may be one.
     """
-    power = np.arange(1, coefficients.shape[1] + 1)
-    top = np.where(at_end, last, first)
-    pieces = np.zeros(first.size, piece_type(power.size))
-    pieces["start"], pieces["end"] = start, end
-    pieces["begin"], pieces["finish"] = np.where(at_end, -length, 0.0), np.where(at_end, 0.0, length)
-    pieces["first"], pieces["last"], pieces["top"] = first, last, top
-    pieces["degree"] = np.where(coefficients != 0.0, power, 0).max(axis=1)
-    pieces["jumps"] = first > np.maximum(np.concatenate([[0.0], last[:-1]]), 0.0)
-    pieces["arc"] = arc & (np.abs(top) == 1.0) & (coefficients[:, 0] == 0.0)
-    pieces["coefficients"] = coefficients
-    pieces["once"] = coefficients / (power + 1)
-    pieces["twice"] = coefficients / ((power + 1) * (power + 2))
+    power, top = np.arange(1, coefficients.shape[1] + 1, dtype=np.int64), np.where(at_end, last, first)
+    fields: dict[str, NDArray[Any]] = {
+        "start": start,  # phases of the motion
+        "end": end,
+        "begin": np.where(at_end, -length, 0.0),  # the same as τ: one of the two is 0
+        "finish": np.where(at_end, 0.0, length),
+        "first": first,  # w at the beginning, the end and the anchor
+        "last": last,
+        "top": top,
+        "degree": np.where(coefficients != 0.0, power, 0).max(axis=1),  # 0: a plateau, 1: a straight line
+        "jumps": first > np.maximum(np.concatenate([[0.0], last[:-1]]), 0.0),  # w jumps up at its beginning
+        # a quarter of a sine about its peak, whose closed forms are shorter than its series
+        "arc": arc & (np.abs(top) == 1.0) & (coefficients[:, 0] == 0.0),
+        "coefficients": coefficients,  # c₁, c₂, …
+        "once": coefficients / (power + 1),  # of the first and second integral from the anchor, of τ² and τ³ on
+        "twice": coefficients / ((power + 1) * (power + 2)),
+    }
+    types = [(name, values.dtype, values.shape[1:]) for name, values in fields.items()]
+    pieces = np.zeros(first.size, np.dtype((np.record, types), align=True))
+    for name, values in fields.items():
+        pieces[name] = values
     return pieces
 
 
 def wave_of_pieces(pieces: np.ndarray, cycle: ArrayLike, shape: ArrayLike, lead: int = 0, repeats: int = 0) -> Wave:
-    """The wave of a table of pieces.
-
-    Its intervals are runs of pieces above zero; one that touches zero ends.  `rises` is left empty: a record has no use
-    for it.
-    """
+    """The wave of a table of pieces; an interval that touches zero ends.  `rises`, of no use to a record, is empty."""
     first, last = pieces["first"], pieces["last"]
-    above = np.concatenate([[False], first + last > 0.0, [False]])
-    touches = np.concatenate([[False], (last[:-1] == 0.0) & (first[1:] == 0.0), [False]])
-    starts = np.flatnonzero(above[1:-1] & (~above[:-2] | touches[:-1]))
-    ends = np.flatnonzero(above[1:-1] & (~above[2:] | touches[1:])) + 1
+    above, top = first + last > 0.0, np.maximum(first, last)
+    parted = ~(above[:-1] & above[1:]) | ((last[:-1] == 0.0) & (first[1:] == 0.0))  # from the next piece
+    starts = np.flatnonzero(above & np.append(True, parted))
+    ends = np.flatnonzero(above & np.append(parted, True)) + 1
     interval = np.column_stack([starts, ends]).astype(np.int64)
-    top = np.maximum(first, last)
     return Wave(
         pieces=pieces,
         cycle=np.asarray(cycle, np.int64),

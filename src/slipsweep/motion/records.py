@@ -11,14 +11,13 @@ from numpy.typing import ArrayLike
 
 from slipsweep.errors import InputError
 from slipsweep.model.parameters import LARGEST, check_choice, check_numbers, check_single, shown
-from slipsweep.motion import formats
-from slipsweep.motion.inspection import drift, odd_peak, without_fill_values
-from slipsweep.motion.intensity import Floats, peak_velocity
+from slipsweep.motion import formats, inspection
+from slipsweep.motion.intensity import Floats, Motion, peak_velocity
 from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS, Baseline, Format, Gaps, Implausible, Reading, Unit
 
 
 @dataclass(frozen=True, eq=False)
-class Record:
+class Record(Motion):
     """A recorded acceleration, interpolated linearly between samples.
 
     Attributes
@@ -49,8 +48,6 @@ class Record:
     Record('short': 5 samples, 0.4 s, peak 2 m/s2)
     """
 
-    times: Floats
-    acceleration: Floats
     name: str = "record"
     attrs: dict[str, str] = field(default_factory=dict)
 
@@ -129,9 +126,8 @@ class Record:
 
     def corrected(self, baseline: Baseline) -> "Record":
         """The record less a constant ("mean") or a straight line ("linear", least squares); "none" leaves it."""
-        degree = {"none": None, "mean": 0, "linear": 1}[check_choice("baseline", baseline, ("none", "mean", "linear"))]
-        values = self.acceleration
-        if degree is not None:
+        degrees, values = {"none": None, "mean": 0, "linear": 1}, self.acceleration
+        if (degree := degrees[check_choice("baseline", baseline, degrees)]) is not None:
             values = values - np.polynomial.Polynomial.fit(self.times, values, degree)(self.times)
         return replace(self, acceleration=values, attrs=self.attrs | {"baseline": baseline})
 
@@ -226,21 +222,10 @@ def read_record(
     >>> slipsweep.read_record("sweeps/data/synthetic.csv")
     Record('sweeps/data/synthetic.csv': 2001 samples, 20 s, peak 3.432 m/s2)
     """
-    reading = Reading(
-        units=units, interval=interval, baseline=baseline, gaps=gaps, implausible=implausible, format=format,
-        channel=channel,
-    )  # fmt: skip
+    reading = Reading(units, interval, baseline, gaps, implausible, format, channel)
     path = Path(path)
     content, lines = formats.read_lines(path)
-    kind, (times, values, own) = formats.read_samples(path, lines, reading)
-    if own and units and UNITS[own] != UNITS[units]:
-        raise InputError(
-            f"{path}: units = {units!r}: the file itself says {own!r}; correct its header, or leave units out"
-        )
-    unit = own or units
-    if not unit:
-        known = ", ".join(map(repr, UNITS))
-        raise InputError(f"{path}: units: must be given, one of {known}: the file does not name the unit")
+    kind, times, values, unit = formats.read_samples(path, lines, reading)
     attrs = {"record": path.name, "record_format": kind, "record_sha256": hashlib.sha256(content).hexdigest()}
     if reading.channel is not None:
         attrs["record_channel"] = str(reading.channel)
@@ -249,12 +234,12 @@ def read_record(
 
 def _inspected(name: str, times: Floats, values: Floats, unit: str, reading: Reading, attrs: dict[str, str]) -> Record:
     """The record of values in a unit; what is found in it is refused, unless `reading` accepts it."""
-    times, values, missing = without_fill_values(times, values)
+    times, values, missing = inspection.without_fill_values(times, values)
     if missing and reading.gaps == "refuse":
         raise InputError(f"{name}: {missing}: samples are missing; gaps = 'linear' interpolates between the others")
     record = Record(times, values * UNITS[unit], name, attrs | {"record_units": unit})
     record = record.corrected(reading.baseline)
-    odd = "; ".join(filter(None, (odd_peak(record, unit), drift(record))))
+    odd = "; ".join(filter(None, (inspection.odd_peak(record, unit), inspection.drift(record))))
     if odd and reading.implausible == "refuse":
         raise InputError(f"{name}: {odd}; or implausible = 'accept' takes the record as it is")
     accepted = "; ".join(filter(None, (missing, odd)))

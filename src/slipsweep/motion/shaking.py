@@ -15,16 +15,14 @@ from slipsweep.errors import InputError
 from slipsweep.model.parameters import check_choice, check_finite, check_list, check_numbers, shown
 from slipsweep.model.units import conversion
 from slipsweep.model.variables import HISTORY
-from slipsweep.motion.formats import Floats, read_columns, read_lines
+from slipsweep.motion.formats import read_columns, read_lines
+from slipsweep.motion.intensity import Floats
 from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS
 from slipsweep.motion.records import check_samples
 
 #: What is measured of the table, and what the block may be measured by.
 TABLE, RESPONSES = "ground_acceleration", ("block_acceleration", "relative_velocity", "relative_displacement")
 CHANNELS = (TABLE, *RESPONSES)
-
-#: Fewer tell nothing of three parameters and their noise.
-FEWEST_SAMPLES = 16
 
 #: Words of a column's name that say what it is: one of each set.
 _NAMES: dict[str, tuple[set[str], ...]] = {
@@ -60,7 +58,7 @@ class ShakingTest:
         own = [name for name in CHANNELS if name in self.channels]
         kept = {name: check_numbers(f"{self.name}: {name}", self.channels[name]) for name in own}
         filled = {name: np.where(np.isnan(values) & (name != TABLE), 0.0, values) for name, values in kept.items()}
-        check_samples(self.name, times, filled, FEWEST_SAMPLES)
+        check_samples(self.name, times, filled, least=16)  # fewer tell nothing of three parameters and their noise
         for name, values in kept.items():
             if np.isnan(values).all():
                 raise InputError(f"{self.name}: {name}: no sample")
@@ -74,12 +72,12 @@ class ShakingTest:
 
     def corrected(
         self, offset: Any = (), drift: Any = (), rest: Sequence[float] | None = None
-    ) -> tuple["ShakingTest", dict[str, tuple[float, float]]]:
+    ) -> tuple["ShakingTest", list[str]]:
         """The test less a constant (`offset`) or a straight line (`drift`) in some channels, "all" is all of them.
 
         Constants and lines are fitted to the samples between the two times of `rest` (s), when the table and the block
         were at rest.  Without it they are fitted to all samples, which is right for accelerations of a motion that
-        begins and ends at rest.  Also returns the constant at the first sample of each, and the slope in a second.
+        begins and ends at rest.  Also returns what was taken off each: its value at the first sample, and its slope.
         """
         offset, drift = (check_channels(*one, self.channels) for one in (("offset", offset), ("drift", drift)))
         chosen = np.ones(self.times.size, dtype=bool)
@@ -88,7 +86,7 @@ class ShakingTest:
             if len(bounds) != 2:
                 raise InputError(f"rest = {shown(rest)}: must be two times, s")
             chosen = (self.times >= bounds[0]) & (self.times <= bounds[1])
-        channels, removed, since = dict(self.channels), {}, self.times - self.times[0]
+        channels, removed, since = dict(self.channels), [], self.times - self.times[0]
         for name in (one for one in CHANNELS if one in (*offset, *drift)):
             use = chosen & np.isfinite(channels[name])
             if use.sum() < 3:
@@ -96,7 +94,9 @@ class ShakingTest:
                 raise InputError(f"{within}{name}: {use.sum()} samples to fit its offset to: must be at least 3")
             line = np.polynomial.Polynomial.fit(since[use], channels[name][use], 1 if name in drift else 0)
             channels[name] = channels[name] - line(since)
-            removed[name] = float(line(0.0)), float(line.deriv()(0.0))
+            constant, slope = (float(one(0.0)) for one in (line, line.deriv()))
+            unit = HISTORY[name]["units"]
+            removed.append(f"{name}: {constant:.4g} {unit}" + (f" and {slope:.4g} {unit} a second" if slope else ""))
         return replace(self, channels=channels), removed
 
 
@@ -111,22 +111,10 @@ def check_channels(key: str, given: Any, known: Collection[str]) -> tuple[str, .
     return tuple(names)
 
 
-def removed_text(removed: Mapping[str, tuple[float, float]]) -> list[str]:
-    """What was taken off each channel, a line each."""
-    texts = []
-    for name, (constant, slope) in removed.items():
-        unit = HISTORY[name]["units"]
-        texts.append(f"{name}: {constant:.4g} {unit}" + (f" and {slope:.4g} {unit} a second" if slope else ""))
-    return texts
-
-
 def read_test(path: str | Path) -> ShakingTest:
-    """Read a test from a CSV file.
+    """Read a test from a CSV file whose header names columns and units (`read_columns`); "g" is standard gravity.
 
-    The first line that is not blank and does not begin with ``#`` names the columns, each with its unit in
-    brackets: ``time (s), table acceleration (g), block acceleration (m/s2), relative displacement (mm)``.  Separators
-    are commas, semicolons or tabs.  Columns of other names are left out.  "g" is standard gravity, 9.80665 m/s².
-
+    Such as ``time (s), table acceleration (g), relative displacement (mm)``.  Columns of other names are left out.
     InputError: the file cannot be read, a column has no unit, or a line holds no numbers.
     """
     path = Path(path)

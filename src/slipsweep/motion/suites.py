@@ -1,7 +1,7 @@
 """Suites of recorded motions: read together, told apart by labels, of any length and sampling."""
 
 import glob
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,9 +18,6 @@ from slipsweep.model.variables import INTENSITY_MEASURES
 from slipsweep.motion.intensity import Floats, intensity_measures
 from slipsweep.motion.reading import Baseline, Format, Gaps, Implausible, Reading, Unit
 from slipsweep.motion.records import Record, read_record
-
-#: Samples of the two components of a pair are at one time if they are nearer than this part of an interval.
-_SAME_TIME = 1e-6
 
 
 @dataclass(frozen=True)
@@ -46,9 +43,7 @@ class Pair:
     Examples
     --------
     >>> import slipsweep
-    >>> first, second = (
-    ...     slipsweep.Record.sampled(values, 0.1, name) for name, values in (("NS", [0, 3, 0]), ("EW", [0, 4, 0]))
-    ... )
+    >>> first, second = (slipsweep.Record.sampled([0, one, 0], 0.1, name) for one, name in ((3, "NS"), (4, "EW")))
     >>> slipsweep.Pair(first, second).rotated(90)
     Record('NS, EW at 90 degrees': 3 samples, 0.2 s, peak 4 m/s2)
     """
@@ -57,13 +52,15 @@ class Pair:
     second: Record
 
     def __post_init__(self) -> None:
-        for name, own in (("first", self.first), ("second", self.second)):
+        components = {"first": self.first, "second": self.second}
+        for name, own in components.items():
             if not isinstance(own, Record):
                 raise InputError(f"{name} = {shown(own)}: must be a Record, one component of a motion")
         times, other = sorted((self.first.times, self.second.times), key=np.size, reverse=True)
-        if np.abs(times[: other.size] - other).max() > _SAME_TIME * np.diff(other).min():
+        # files round times: to the millionth part of an interval they are the same
+        if np.abs(times[: other.size] - other).max() > 1e-6 * np.diff(other).min():
             raise InputError(f"{self.name}: the components of a pair must be sampled at the same times")
-        for name, own in (("first", self.first), ("second", self.second)):
+        for name, own in components.items():
             filled = np.append(own.acceleration, np.zeros(times.size - own.times.size))
             object.__setattr__(self, name, replace(own, times=times, acceleration=filled))
 
@@ -93,6 +90,7 @@ class Pair:
 
 
 Motion: TypeAlias = Record | Pair
+_Source: TypeAlias = tuple[Path | Record, ...]  # what a motion is read from: one part, or the components of a pair
 
 
 @dataclass(frozen=True, repr=False)
@@ -185,10 +183,10 @@ class Suite:
     @cached_property
     def duplicates(self) -> tuple[tuple[str, ...], ...]:
         """Labels of motions that have the same samples, such as one file under two names."""
-        alike: dict[bytes, list[str]] = {}
+        alike = defaultdict[bytes, list[str]](list)
         for label, motion in zip(self.labels, self, strict=True):
             samples = b"".join(one.acceleration.tobytes() + one.times.tobytes() for one in _components(motion))
-            alike.setdefault(samples, []).append(label)
+            alike[samples].append(label)
         return tuple(tuple(labels) for labels in alike.values() if len(labels) > 1)
 
     @cached_property
@@ -280,41 +278,29 @@ def read_suite(
     >>> slipsweep.read_suite("sweeps/data/suite", pairs=("_H1", "_H2"))
     Suite('sweeps/data/suite': 4 pairs: rock-far, rock-near, soft-far, stiff-pulse)
     """
-    reading = Reading(
-        units=units, interval=interval, baseline=baseline, gaps=gaps, implausible=implausible, format=format,
-        channel=channel,
-    )  # fmt: skip
+    reading = Reading(units, interval, baseline, gaps, implausible, format, channel)
     return suite_in(Path(), paths, pairs, reading)
-
-
-#: What a motion is read from: one part, or the two components of a pair.
-_Source: TypeAlias = tuple[Path | Record, ...]
 
 
 def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Reading) -> Suite:
     """`read_suite` of paths that are relative to a folder, whatever letters its own name has."""
     sources = _sources(paths, folder)
-    if pairs is not None:
-        sources = _paired(sources, pairs)
+    sources, labels = (sources, ()) if pairs is None else _paired(sources, pairs)
     records: dict[Path | Record, Record] = {}
     reasons = {}
     for part in dict.fromkeys(chain.from_iterable(sources)):
         try:
             records[part] = part if isinstance(part, Record) else read_record(part, **reading.options)
         except InputError as error:
-            reasons[part] = str(error).removeprefix(f"{part}: ")
+            reasons[part] = str(error)
     if reasons:
         names = ", ".join(part.name for part in reasons)
         refused = InputError(f"{len(reasons)} of {len(reasons) + len(records)} files cannot be read: {names}")
-        for part, reason in reasons.items():
-            refused.add_note(f"{part}: {reason}")
+        for reason in reasons.values():
+            refused.add_note(reason)
         raise refused
     found = [[records[part] for part in source] for source in sources]
     motions = tuple(Pair(*parts) if len(parts) == 2 else parts[0] for parts in found)
-    labels: tuple[str, ...] = ()
-    if pairs is not None:
-        firsts = [Path(first.name) for first, _ in found]
-        labels = _labels([one.with_name(one.stem.removesuffix(pairs[0]).rstrip("_-. ") or one.stem) for one in firsts])
     entry = paths[0] if isinstance(paths, (list, tuple)) and len(paths) == 1 else paths
     return Suite(motions, labels, str(entry) if isinstance(entry, (str, Path)) else "suite")
 
@@ -343,22 +329,20 @@ def _sources(given: Any, folder: Path) -> list[_Source]:
 
 
 def _matching(folder: Path, entry: str | Path) -> list[Path]:
-    """The files that an entry names."""
     path, pattern = folder / entry, str(entry)
     if path.is_dir():
         pattern = f"{glob.escape(pattern)}/*"
     elif path.exists() or not glob.has_magic(pattern):
         return [path]
-    found = (folder / one for one in glob.iglob(pattern, root_dir=folder, recursive=True))
-    files = sorted(one for one in found if one.is_file())
-    if not files:
+    names = glob.iglob(pattern, root_dir=folder, recursive=True)
+    if not (files := sorted(file for name in names if (file := folder / name).is_file())):
         what = "a folder without files" if path.is_dir() else "no file fits this pattern"
         raise InputError(f"paths: {entry}: {what}")
     return files
 
 
-def _paired(sources: Sequence[_Source], endings: Sequence[str]) -> list[_Source]:
-    """Files put together two by two."""
+def _paired(sources: Sequence[_Source], endings: Sequence[str]) -> tuple[list[_Source], tuple[str, ...]]:
+    """Files put together two by two, and the labels of the pairs: what the names of both files begin with."""
     texts = [one for one in check_list("pairs", endings, "two endings of names") if isinstance(one, str) and one]
     if len(texts) != len(endings) or len({*texts}) != 2:
         raise InputError(f"pairs = {shown(endings)}: must be two different endings of names, such as ('_NS', '_EW')")
@@ -372,7 +356,8 @@ def _paired(sources: Sequence[_Source], endings: Sequence[str]) -> list[_Source]
     whole = {one for pair in pairs.items() for one in pair if {*pair} <= {*parts}}
     if incomplete := ", ".join(one.name for one in parts if one not in whole):
         raise InputError(f"pairs = {shown(endings)}: without the other component: {incomplete}")
-    return list(pairs.items())
+    stems = [one.with_name(one.stem.removesuffix(first).rstrip("_-. ") or one.stem) for one in pairs]
+    return list(pairs.items()), _labels(stems)
 
 
 def _labels(paths: Sequence[Path]) -> tuple[str, ...]:

@@ -14,9 +14,6 @@ from slipsweep.errors import InputError
 from slipsweep.model.choices import Choice, Family, option
 from slipsweep.model.parameters import MOST_CYCLES, number_text
 
-#: Largest multiple of a harmonic.
-MOST_MULTIPLE = 100
-
 
 @dataclass(frozen=True)
 class Waveform(Choice):
@@ -39,8 +36,8 @@ class Waveform(Choice):
 
     def __str__(self) -> str:
         """In words, as a caption has it: ``10 cycles of a triangle wave, ramp in 2 cycles``."""
-        given = {"in": self.ramp_in, "out": self.ramp_out}
-        ramps = "".join(f", ramp {word} {number_text(ramp)} cycles" for word, ramp in given.items() if ramp)
+        given = (("in", self.ramp_in), ("out", self.ramp_out))
+        ramps = "".join(f", ramp {word} {number_text(ramp)} cycles" for word, ramp in given if ramp)
         return f"{self.cycles} cycle{'s' if self.cycles > 1 else ''} of a {self._words()}{ramps}"
 
     def _words(self) -> str:
@@ -141,7 +138,7 @@ class Square(Waveform):
 @dataclass(frozen=True)
 class _Terms:  # a base of its own, as a field without a default comes first
     amplitudes: Sequence[float] = option("relative amplitudes of the harmonics")
-    multiples: Sequence[int] = option("multiples of the frequency of the harmonics", least=1, most=MOST_MULTIPLE)
+    multiples: Sequence[int] = option("multiples of the frequency of the harmonics", least=1, most=100)
     phases: Sequence[float] | None = option("phases of the harmonics, degrees", None)
 
 

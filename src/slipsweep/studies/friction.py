@@ -20,7 +20,7 @@ from slipsweep._version import __version__
 from slipsweep.errors import InputError
 from slipsweep.model.parameters import check_finite, check_numbers, check_single, shown, single_friction_coefficient
 from slipsweep.model.variables import HISTORY, MEASURED_FRICTION, PARAMETERS, REFERENCE, SLIDES
-from slipsweep.motion.shaking import CHANNELS, TABLE, ShakingTest, read_test, removed_text, unit_factor
+from slipsweep.motion.shaking import CHANNELS, TABLE, ShakingTest, read_test, unit_factor
 
 Floats = NDArray[np.float64]
 
@@ -287,7 +287,7 @@ def measured_friction(
             **coefficients.attrs,
             "threshold": limit,
             "threshold_from": why,
-            "removed": "; ".join(removed_text(removed)) or "nothing",
+            "removed": "; ".join(removed) or "nothing",
         },
     )
 
