@@ -21,7 +21,7 @@ ORDER = (
 LINES = {
     "jit": 315,
     "model": 1_365,
-    "motion": 2_010,
+    "motion": 1_940,
     "kernels": 3_150,
     "grid": 1_050,
     "studies": 3_885,
