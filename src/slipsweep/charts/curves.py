@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from slipsweep.charts import solved, style
-from slipsweep.charts.sheet import Panel, Sheet, curve_looks, has_flags, log_axis, log_ticks, plot_curve, reliable
+from slipsweep.charts.sheet import Panel, Sheet, curve_looks, log_axis, log_ticks, plot_curve
 from slipsweep.charts.slices import Result
 from slipsweep.charts.style import Look
 from slipsweep.errors import InputError
@@ -85,8 +85,6 @@ def _drawn(sheet: Sheet, name: str, scaled: bool = False) -> Figure:
         label, least = "permanent displacement, u\u00a0ω²\u00a0/\u00a0A", 1e-4
         factor, divisor = (2 * math.pi * sheet.data["frequency"]) ** 2, sheet.data["amplitude"]
         sheet.data["over_yield"] = divisor / sheet.data["yield_line"]
-    else:
-        sheet.set_axis("x")
     for one in {"drawn", "newmark"} & {*sheet.data}:
         sheet.data[one] = sheet.data[one] * factor / divisor
     every = [_curves(panel, panel.data["drawn"]) for panel in sheet.panels]
@@ -119,7 +117,6 @@ def spread(result: Result, options: style.Options) -> Figure:
     # the others have a mode limit, whatever this one is
     sheet.show(solved.DISPLACEMENT, "Barred, of this result", always=True)
     sheet.data["drawn"] = sheet.data["drawn"] * 1000.0
-    sheet.set_axis("x")
     flags: list[xr.DataArray] = []
     answers = [_answers(sheet, panel, flags) for panel in sheet.panels]
     values = np.concatenate([ys for one in answers for (_, ys), _ in one.values()])
@@ -153,7 +150,7 @@ def _answers(sheet: Sheet, panel: Panel, flags: list[xr.DataArray]) -> dict[str,
     for text, (model, changed, look) in options.items():
         answer = solved.solve(data, [solved.DISPLACEMENT, "validity"], model, **changed)
         flags.append(answer["validity"])
-        drawn = reliable(answer, solved.DISPLACEMENT, panel.options) * 1000.0
+        drawn = solved.reliable(answer, solved.DISPLACEMENT, panel.options.show_cautions) * 1000.0
         found[text] = _curves(panel, drawn)[0], {"linewidth": 1.0, "markersize": 3.5, **look}
     text = style.NEWMARK
     if own is ours:
@@ -205,9 +202,9 @@ def _draw_newmark(sheet: Sheet, panel: Panel, curve: Curve, look: Look) -> None:
 def _underlay(sheet: Sheet, panel: Panel) -> None:
     """Put a broad grey line under what a caution is about, and a barred one under what no block does."""
     drawn = panel.data["drawn"]
-    flagged = (drawn > 0) & has_flags(panel.data["validity"], CAUTIONS)
+    flagged = (drawn > 0) & solved.has_flags(panel.data["validity"], CAUTIONS)
     seen = sheet.data["validity"].where(sheet.data["drawn"] > 0)
-    names = [style.flag_name(flag) for flag in CAUTIONS if has_flags(seen, flag).any()]
+    names = [style.flag_name(flag) for flag in CAUTIONS if solved.has_flags(seen, flag).any()]
     marks = [("caution", "caution:\n" + "\n".join(names), _CAUTION, flagged)]
     if "unsound" in panel.data:
         text = style.UNSOUND if "newmark" in panel.data else "falls with A"

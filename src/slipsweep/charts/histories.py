@@ -1,5 +1,6 @@
 """Figures over time: the history of a block, measured friction, measured against computed motion."""
 
+import itertools
 from collections.abc import Iterable
 from typing import Any
 
@@ -24,7 +25,7 @@ _MODES: dict[SlidingMode, Look] = {
 }
 
 #: What legends above a panel have in common.
-_ABOVE: Look = {"loc": "lower right", "bbox_to_anchor": (1, 1), "frameon": False}
+_ABOVE: Look = {"loc": "lower right", "bbox_to_anchor": (1, 1), "frameon": False, "ncols": 4}
 
 _GREY = "0.45"
 
@@ -42,11 +43,12 @@ def _plot(panel: Axes, table: xr.Dataset, name: str, ylabel: str, factor: float 
 
 
 def _finish(drawing: Drawing, panels: Iterable[Axes], texts: list[str]) -> Figure:
-    """A line at zero and a grid in the panels, and a caption."""
+    """A line at zero and a grid in the panels, the time below the last ones, and a caption."""
     for panel in panels:
         panel.axhline(0, color="0.6", linewidth=0.8, zorder=0)
         panel.margins(x=0)
         panel.grid(color="0.9")
+        panel.set_xlabel("time (s)" if panel in drawing.grid[-1] else "")
     drawing.figure.align_ylabels()
     return drawing.finish(texts)
 
@@ -55,9 +57,8 @@ def history(result: Result, options: Options) -> Figure:
     """A time history in the manner of the paper's Figs. 5, 8 and 9; of a record with the modes of its half waves."""
     data = result.data
     modes, friction = "half_wave_mode" in data, "friction_coefficient" in data
-    heights = [*([0.22] if modes else []), *([1.0] * (3 + friction))]
-    size, ratios = (7.0, 7.0 + 0.5 * modes), {"height_ratios": heights}
-    drawing = Drawing(options, len(heights), 1, size, sharey=False, gridspec_kw=ratios)
+    heights = [0.22] * modes + [1.0] * (3 + friction)
+    drawing = Drawing(options, len(heights), 1, (7.0, 7.0 + 0.5 * modes), sharey=False, height_ratios=heights)
     panels = list(drawing.grid.ravel()[modes:])
     accelerations, *_, velocity, displacement = panels
     label = "acceleration\n(m/s²)"
@@ -70,13 +71,12 @@ def history(result: Result, options: Options) -> Figure:
             if np.isfinite(value) and value <= 1.5 * highest:
                 text, look = style.LINES[str(name)]
                 accelerations.axhline(value.item(), label=text, gid=name, **{**look, "linewidth": 0.9, "zorder": 1.5})
-    accelerations.legend(ncols=4, fontsize="small", **_ABOVE)
+    accelerations.legend(fontsize="small", **_ABOVE)
     if friction:
         _plot(panels[1], data, "friction_coefficient", "friction\ncoefficient")
     _plot(velocity, data, "relative_velocity", "relative\nvelocity (m/s)")
     factor, unit = (1.0, "m") if (np.abs(data["relative_displacement"]) >= 1.0).any() else (1000.0, "mm")
     _plot(displacement, data, "relative_displacement", f"relative\ndisplacement ({unit})", factor)
-    displacement.set_xlabel("time (s)")
     return _finish(drawing, panels, [style.caption(data, options)])
 
 
@@ -94,7 +94,7 @@ def _draw_modes(panel: Axes, data: xr.Dataset) -> None:
     panel.set_yticks([])
     panel.tick_params(axis="x", bottom=False)
     panel.set_ylabel("half\nwaves", rotation=0, ha="right", va="center", fontsize="small")
-    panel.legend(handles=entries, ncols=3, fontsize="small", **_ABOVE)
+    panel.legend(handles=entries, fontsize="small", **_ABOVE)
     panel.margins(x=0)
 
 
@@ -106,18 +106,16 @@ def friction(result: Result, options: Options) -> Figure:
     label = "acceleration\n(m/s²)"
     _plot(accelerations, table, "ground_acceleration", label, color=BLUE, label="table")
     _plot(accelerations, table, "block_acceleration", label, linewidth=1.0, label="block")
-    accelerations.legend(ncols=2, **_ABOVE)
+    accelerations.legend(**_ABOVE)
     _friction_lines(table, coefficient)
     coefficient.axhline(table["mu_s"].item(), color=_GREY, linewidth=0.8, linestyle="--", label="μs")
-    coefficient.legend(ncols=3, **_ABOVE)
-    coefficient.set_xlabel("time (s)")
+    coefficient.legend(**_ABOVE)
     stops = table["slide_stop"].fillna(table["time"].values[-1]).values
-    for panel in (accelerations, coefficient):
-        for onset, stop in zip(table["slide_onset"].values, stops, strict=True):
-            panel.axvspan(onset, stop, color="0.92", zorder=0)
+    for panel, span in itertools.product(drawing.grid.ravel(), zip(table["slide_onset"].values, stops, strict=True)):
+        panel.axvspan(*span, color="0.92", zorder=0)
     shaded = f"shaded: slides, relative acceleration beyond {table.attrs['threshold']:.3g} m/s²"
     texts = [table.attrs["constant_friction"], f"{_given(table)}; {shaded}"]
-    return _finish(drawing, [accelerations, coefficient], texts)
+    return _finish(drawing, drawing.grid.ravel(), texts)
 
 
 def calibration(result: Result, options: Options) -> Figure:
@@ -140,7 +138,7 @@ def _draw_test(table: xr.Dataset, panels: list[Axes]) -> None:
     measured: Look = {"color": _GREY, "marker": ".", "linestyle": "", "markersize": 2, "label": "measured"}
     _plot(ground, table, "measured_ground_acceleration", label, **measured)
     _plot(ground, table, "computed_ground_acceleration", label, color=BLUE, label="smooth")
-    ground.legend(ncols=2, **_ABOVE)
+    ground.legend(**_ABOVE)
     for panel, (name, (label, factor, unit)) in zip(panels[1:4], _CHANNELS.items(), strict=True):
         text = "not measured"
         if f"misfit_{name}" in table and bool(table[f"misfit_{name}"].notnull()):
@@ -149,11 +147,10 @@ def _draw_test(table: xr.Dataset, panels: list[Axes]) -> None:
             text = f"misfit {misfit:.2g} {unit} ({share:.1%})"
         _plot(panel, table, f"computed_{name}", label, factor, linewidth=1.2, label="computed")
         panel.set_title(text, fontsize="small", loc="left")
-    panels[1].legend(ncols=2, **_ABOVE)
+    panels[1].legend(**_ABOVE)
     if len(panels) > 4:
         _friction_lines(table, panels[4])
-        panels[4].legend(ncols=2, **_ABOVE)
-    panels[-1].set_xlabel("time (s)")
+        panels[4].legend(**_ABOVE)
 
 
 def _friction_lines(table: xr.Dataset, panel: Axes) -> None:

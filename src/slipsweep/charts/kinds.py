@@ -10,9 +10,8 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from slipsweep._version import __version__
-from slipsweep.charts import curves, histories, limits, maps, statistics, style, suites
+from slipsweep.charts import curves, histories, limits, maps, solved, statistics, style, suites
 from slipsweep.charts.slices import Result
-from slipsweep.charts.solved import DISPLACEMENT, is_newmark, is_recorded
 from slipsweep.charts.style import Options
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.opening import values_text
@@ -56,18 +55,16 @@ def check_kind(kind: str) -> str:
 def fitting(result: Result, options: Options) -> list[str]:
     """The kinds that are drawn of a result if none is named; with one axis left, its curve."""
     kinds = [*kinds_of(result.sort)]
-    if result.sort == "statistics" and "total_index" not in result.variables:
-        kinds.remove("sensitivity")
     if result.sort != "sweep":
-        return kinds
-    if DISPLACEMENT not in result.variables:
+        return [kind for kind in kinds if kind != "sensitivity" or "total_index" in result.variables]
+    if solved.DISPLACEMENT not in result.variables:
         return ["modes"]
     free = [dim for dim in result.groups if dim not in (*options.at, *options.panels)]
     if len(free) == 1:
         several = any(len(places) > 1 for places in result.places(options.at).values())
         return ["families"] if several or options.panels else ["curve"]
     unfit = {"curve"}
-    if is_newmark(result.data):  # the ratio is 1, and without θ and μs there are no other options
+    if solved.is_newmark(result.data):  # the ratio is 1, and without θ and μs there are no other options
         unfit |= {"newmark", *(["spread"] if "yield_coefficient" in result.data.coords else [])}
     return [kind for kind in kinds if kind not in unfit]
 
@@ -127,11 +124,11 @@ def write_book(path: Path, result: Result, figures: Iterable[Figure]) -> None:
 def title_page(result: Result) -> Figure:
     """What was computed, of which inputs, by which model and estimates, and by which versions."""
     attributes, coords = result.attrs, result.data.coords
-    names = {name: f"{PARAMETERS[name]['long_name']} {style.SYMBOLS[name]}" for name in PARAMETERS}
+    names = {name: f"{about['long_name']} {style.SYMBOLS[name]}" for name, about in PARAMETERS.items()}
     names |= {"label": "label", "motion": "motion"}
     inputs = [style.plain(f"{text}: {values_text(coords[name])}") for name, text in names.items() if name in coords]
     compared = ["one interface (μs 0.38), two shaking-table tests: θ 5 and 6°, 0.36 and 0.52 g, 1.8 and 3.5 Hz"]
-    if is_recorded(result.data):
+    if solved.is_recorded(result.data):
         compared.append("none under recorded motions: the rules for them extend the paper")
     sections = {
         "Results": [f"{name}: {style.SHOWN[name]['long_name']}" for name in result.variables],
@@ -139,10 +136,10 @@ def title_page(result: Result) -> Figure:
         "Model and estimates": style.model_text(attributes).splitlines(),
         "Range in which the model was compared with measurements": compared,
     }
-    if not is_recorded(result.data):
+    if not solved.is_recorded(result.data):
         left_out = "; left out of contours and curves unless their caption says that it is drawn"
         sections["Flags that the charts hatch"] = [
-            f"{style.flag_name(flag)} ({flag.kind}): {flag.text}{left_out if flag in style.LEFT_OUT else ''}"
+            f"{style.flag_name(flag)} ({flag.kind}): {flag.text}{left_out if flag in solved.LEFT_OUT else ''}"
             for flag in maps.HATCHES
         ]
     sections["Origin"] = [

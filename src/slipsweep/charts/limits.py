@@ -21,10 +21,9 @@ _MOST_CURVES, _MOST_MARKS = 8, 20
 
 
 def limit(result: Result, options: Options) -> Figure:
-    """Limit amplitudes, in g, over one axis: a curve for each value of another, or a thin line for each motion.
+    """Limit amplitudes, in g, over one axis: a curve for each value of another; of a suite as `draw_suite`.
 
-    Curves end where no limit exists; circles mark limits set by a discontinuity of the model.  Of a suite with the
-    median and the 16 to 84 % band; where nothing but the motion varies, the motions lie along the abscissa.
+    Where nothing but the motion varies, the motions lie along the abscissa.
     """
     suite = SUITE if "motion" in result.dims else ()
     single = suite and not {*result.wide} - {*SUITE, *options.at}
@@ -40,8 +39,6 @@ def limit(result: Result, options: Options) -> Figure:
             labels = [style.plain(name) for name in axis_labels(sheet.data, sheet.x)]
             panel.axes.set_xticks(panel.xs, labels, rotation=40, ha="right")
             panel.axes.set_xlabel(sheet.x)
-    if sheet.x not in NAMED:
-        sheet.set_axis("x")
     # one scale for all, from zero; only now, for it ends the autoscaling
     sheet.panels[0].axes.set_ylim(bottom=0.0)
     if not np.isfinite(sheet.data["limit_amplitude"]).any():

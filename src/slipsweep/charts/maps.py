@@ -22,9 +22,9 @@ from scipy import ndimage
 from scipy.spatial import KDTree
 
 from slipsweep.charts import style
-from slipsweep.charts.sheet import Panel, Sheet, has_flags
+from slipsweep.charts.sheet import Panel, Sheet
 from slipsweep.charts.slices import Result
-from slipsweep.charts.solved import DISPLACEMENT, DRIVES, is_newmark
+from slipsweep.charts.solved import DISPLACEMENT, DRIVES, has_flags, is_newmark
 from slipsweep.charts.style import Floats, Look, Options
 from slipsweep.errors import InputError
 from slipsweep.model.variables import RESULTS, SlidingMode, Validity
@@ -81,7 +81,8 @@ def contours(result: Result, options: Options) -> Figure:
     of_length = RESULTS[name].get("units") == "m"
     texts = [style.length_text(one) if of_length else style.with_unit(f"{one:.3g}", style.unit(name)) for one in levels]
     # what is below the lowest level, or nothing, is a hundredth of it; what does not slide is covered later
-    _fill_panels(sheet, colours, norm, texts, RESULTS[name]["long_name"], least=levels[0] / 100)
+    sheet.data["drawn"] = drawn.clip(min=levels[0] / 100)
+    _fill_panels(sheet, colours, norm, texts, RESULTS[name]["long_name"])
     return _finish(sheet, name)
 
 
@@ -121,8 +122,6 @@ def _sheet(result: Result, options: Options, names: list[str], across: Sequence[
     varies = across[0] == "frequency" or "displacement_amplitude" in result.data.coords
     sheet = result.sheet(options, names, across, y=DRIVES, same=[] if varies else ["frequency"])
     sheet.show(names[0], f"Hatched {UNSOUND_HATCH}")
-    sheet.set_axis("x")
-    sheet.set_axis("y")
     for panel, (name, (text, look)) in itertools.product(sheet.panels, style.LINES.items()):
         excess = _excess(panel, name)
         if excess.count() and excess.min() < 0 < excess.max():
@@ -137,17 +136,15 @@ def _excess(panel: Panel, line: str) -> Any:
     return np.ma.masked_invalid(panel.grid("amplitude") - (panel.grid(line) if line in panel.data else np.nan))
 
 
-def _fill_panels(
-    sheet: Sheet, colours: Colormap, norm: BoundaryNorm, texts: list[str], label: str, least: float = 0.0
-) -> None:
-    """Fill between contours and label them, up to the jump at the mode limit; values below `least` are drawn as it."""
+def _fill_panels(sheet: Sheet, colours: Colormap, norm: BoundaryNorm, texts: list[str], label: str) -> None:
+    """Fill between contours and label them, up to the jump at the mode limit."""
     places, areas = norm.boundaries, None
     look: Look = {"cmap": colours, "norm": norm}
     line: Look = {"colors": "black", "linewidths": 0.7, "linestyles": "solid", "zorder": 1}
     for panel in sheet.panels:
         xs, ys = panel.xs, panel.ys
         with np.errstate(divide="ignore", invalid="ignore"):
-            logs = np.log10(np.maximum(panel.grid("drawn"), least))
+            logs = np.log10(panel.grid("drawn"))
         # what contours leave open along the mode limit and cells without a value has the colours of the cells
         cells = np.ma.masked_invalid(logs)
         panel.axes.pcolormesh(xs, ys, cells, shading="nearest", zorder=0.4, rasterized=True, **look)

@@ -1,14 +1,10 @@
-"""The one builder of figures: layout, size, panels, axes, a legend outside of the data, caption, grey.
-
-Figures are made without pyplot, hence without a window system or state between calls;
-`matplotlib.figure.Figure.savefig` writes them in any format.
-"""
+"""The one builder of figures, without pyplot: size, panels, axes, legend outside of the data, caption, grey."""
 
 import itertools
 import math
 import textwrap
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -185,7 +181,7 @@ class Sheet(Drawing):
             if title:
                 one.set_title(title, fontsize="medium")
 
-    def set_axis(self, side: Literal["x", "y"]) -> None:
+    def set_axis(self, side: str) -> None:
         """Scale, ticks and label of an axis, and the acceleration in the other unit on the opposite side."""
         name, values = (self.x, self.panels[0].xs) if side == "x" else (str(self.y), self.panels[0].ys)
         for panel in self.panels:
@@ -203,8 +199,8 @@ class Sheet(Drawing):
         """Say which unreliable values are left out or drawn on request; displacements upslope have no logarithm."""
         flags = [*others, *([self.data["validity"]] if "validity" in self.data else [])]
         groups: dict[str, list[str]] = {}
-        for flag, text in style.LEFT_OUT_TEXT.items():
-            if any(has_flags(one, flag).any() for one in flags):
+        for flag, text in solved.LEFT_OUT.items():
+            if any(solved.has_flags(one, flag).any() for one in flags):
                 drawn = self.options.show_cautions and not (name == solved.DISPLACEMENT and flag == Validity.UPSLOPE)
                 groups.setdefault("Drawn on request" if drawn else "Left out", []).append(text)
         self.notes += [f"{heading}: values flagged {' or '.join(texts)}." for heading, texts in groups.items()]
@@ -215,7 +211,7 @@ class Sheet(Drawing):
         ``drawn``, the values that may be drawn; `thresholds`; of displacements ``newmark``, that of Newmark's block,
         and ``unsound``, where there is a trend that no block has.  Notes compare the two, and say how much is `marked`.
         """
-        drawn = reliable(self.data, name, self.options)
+        drawn = solved.reliable(self.data, name, self.options.show_cautions)
         self.data = self.data.merge(solved.thresholds(self.data, always)).assign(drawn=drawn)
         if name != solved.DISPLACEMENT or solved.is_newmark(self.data):
             return
@@ -229,15 +225,10 @@ class Sheet(Drawing):
                     f"Ratio to the displacement of Newmark's block with the same Üy: median {middle:.3g}; "
                     f"90 % of the sliding cells shown lie between {low:.3g} and {high:.3g}."
                 )
-        falls, below = ((drawn > 0) & one for one in solved.unsound(self.data, theirs))
-        self.data["unsound"] = (falls | below).transpose(*drawn.dims)
-        if self.data["unsound"].any():
-            slides = int((drawn > 0).sum())
-            trends = solved.trend_text(falls, below, slides)
-            self.notes.append(
-                f"{marked}: {solved.percent(int(self.data['unsound'].sum()) / slides)} of the sliding cells shown. "
-                f"{trends[0].upper()}{trends[1:]}."
-            )
+        self.data["unsound"], trends = solved.unsound(self.data, drawn, theirs)
+        if trends:
+            share = solved.percent(int(self.data["unsound"].sum()) / int((drawn > 0).sum()))
+            self.notes.append(f"{marked}: {share} of the sliding cells shown. {trends[0].upper()}{trends[1:]}.")
 
     def done(self, beside: bool = True) -> Figure:
         """Draw legend and caption."""
@@ -252,20 +243,6 @@ class Sheet(Drawing):
             values = ", ".join(member_text(self.data, name, at, self.options) for name in own)
             cases.append(f"{member_text(self.data, 'case', at, self.options)}: {values}.")
         return self.finish([text, *cases], beside)
-
-
-def reliable(results: xr.Dataset, name: str, options: Options) -> xr.DataArray:
-    """A result as it may be drawn: NaN where it is upslope, or left out for its flags."""
-    values = results[name]
-    shown = values >= 0
-    if "validity" in results and not options.show_cautions:
-        shown = shown & ~has_flags(results["validity"], style.LEFT_OUT)
-    return values.where(shown).transpose(*values.dims)
-
-
-def has_flags(validity: xr.DataArray, flags: int) -> xr.DataArray:
-    """Where any of some flags is set."""
-    return (validity.fillna(0).astype(np.int64) & int(flags)) != 0
 
 
 def member_text(data: xr.Dataset, dim: str, index: int, options: Options) -> str:

@@ -83,9 +83,13 @@ class Result:
 
     def result(self, name: str) -> str:
         """`name` if it is a result in the file (InputError otherwise, naming those there are)."""
-        if name not in self.variables:
-            raise InputError(f"{self.name}: {name}: no such variable; {did_you_mean(name, self.variables)}")
-        return name
+        return self.known(name, self.variables, f"{name}: no such variable")
+
+    def known(self, given: str, there: Sequence[str], problem: str, more: str = "") -> str:
+        """What a user names, if it is there (InputError otherwise: the problem, and what is there)."""
+        if given not in there:
+            raise InputError(f"{self.name}: {problem}; {did_you_mean(given, there)}{more}")
+        return given
 
     def quantity(self, name: str) -> str:
         """`name` if it is a result that contours and curves can show."""
@@ -151,8 +155,7 @@ class Result:
         if solved and self.sort != "sweep" and self.motion is None:
             self.result(solved[0])
         if solved:
-            found = solve(data, solved, motion=self.motion)
-            data = data.drop_vars(there if exact else []).assign(found.data_vars)
+            data = data.assign(solve(data, solved, motion=self.motion).data_vars)
         return data.assign_attrs(picked=picked)
 
     def spread(self, dim: str, number: int) -> list[Place]:
@@ -207,19 +210,18 @@ class Result:
         if options.more_panels and not panels:
             panels = [dim for dim in groups if dim not in (*kept, *same, *options.at)]
         for name in panels[:2]:
-            if name not in groups or name in kept:
-                left = [dim for dim in groups if dim not in kept]
-                raise InputError(f"{self.name}: --panels {name}: must be another axis; {did_you_mean(name, left)}")
+            self.known(name, [dim for dim in groups if dim not in kept], f"--panels {name}: must be another axis")
             kept[name] = places.get(name) or self.spread(name, _PANELS)
-        return Sheet(self.select(names, kept, options.at), across, up, options, *panels[:2])
+        sheet = Sheet(self.select(names, kept, options.at), across, up, options, *panels[:2])
+        for side in ("x", "y") if y else () if isinstance(x, str) or across in NAMED else ("x",):
+            sheet.set_axis(side)
+        return sheet
 
     def _axis(self, options: Options, option: str, there: list[str], preferred: Sequence[str], more: str = "") -> str:
         """The axis that an option names, or the first of those preferred, or any that is left for it."""
         given: str | None = getattr(options, option)
         if given is not None:
-            if given not in there:
-                raise InputError(f"{self.name}: --{option} {given}: no such axis; {did_you_mean(given, there)}{more}")
-            return given
+            return self.known(given, there, f"--{option} {given}: no such axis", more)
         free = [dim for dim in there if dim not in (*options.panels, *options.at, options.x, options.y)]
         found = next((dim for dim in (*preferred, *free) if dim in free), None)
         if found is None:

@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from slipsweep.model.options import MODELS, SOLVERS, Mendez, Model, Newmark
-from slipsweep.model.variables import PARAMETERS, RECORD_INPUTS, STRENGTHS, WAVEFORM_INPUTS
+from slipsweep.model.variables import PARAMETERS, RECORD_INPUTS, STRENGTHS, WAVEFORM_INPUTS, Validity
 from slipsweep.motion.waveforms import WAVEFORMS, peak_acceleration
 from slipsweep.studies.datasets import friction_parameters, sweep
 
@@ -17,6 +17,12 @@ DRIVES = ("amplitude", "displacement_amplitude")
 DISPLACEMENT = "permanent_displacement"
 
 _BLOCK = ("theta", "mu_s", "yield_acceleration")
+
+#: Flags of values that are unreliable, left out unless requested, and what captions say of them.
+LEFT_OUT = {
+    Validity.NOT_RECOUPLED: "not_recoupled (does not come to rest within the cycle)",
+    Validity.UPSLOPE: "upslope (ends above where it began)",
+}
 
 
 def is_recorded(data: xr.Dataset) -> bool:
@@ -90,11 +96,25 @@ def newmark(data: xr.Dataset) -> xr.DataArray | None:
     return solve(data, [DISPLACEMENT], Newmark(g=float(data.attrs["g"])))[DISPLACEMENT]
 
 
-def unsound(data: xr.Dataset, theirs: xr.DataArray | None) -> tuple[xr.DataArray, xr.DataArray]:
-    """Where the displacement of a slice has a trend that no block has, two arrays.
+def has_flags(validity: xr.DataArray, flags: int) -> xr.DataArray:
+    """Where any of some flags is set."""
+    return (validity.fillna(0).astype(np.int64) & int(flags)) != 0
 
-    It is smaller than at an amplitude that is 1 % smaller, of recorded motions than at the next smaller amplitude of
-    the slice; it is less than half of that of Newmark's block, `theirs`.
+
+def reliable(results: xr.Dataset, name: str, show_cautions: bool = False) -> xr.DataArray:
+    """A result as it may be drawn: NaN where it is upslope, or left out for its flags."""
+    values = results[name]
+    shown = values >= 0
+    if "validity" in results and not show_cautions:
+        shown = shown & ~has_flags(results["validity"], sum(LEFT_OUT))
+    return values.where(shown).transpose(*values.dims)
+
+
+def unsound(data: xr.Dataset, drawn: xr.DataArray, theirs: xr.DataArray | None) -> tuple[xr.DataArray, str]:
+    """Where the displacements `drawn` of a slice have a trend that no block has, and the trends and shares in words.
+
+    One is smaller than at an amplitude that is 1 % smaller, of recorded motions than at the next smaller amplitude of
+    the slice; or it is less than half of that of Newmark's block, `theirs`.
     """
     ours = data[DISPLACEMENT]
     drive = next((name for name in ("displacement_amplitude", *STRENGTHS) if name in data.coords), "")
@@ -103,15 +123,15 @@ def unsound(data: xr.Dataset, theirs: xr.DataArray | None) -> tuple[xr.DataArray
     else:
         before = solve(data, [DISPLACEMENT], **{drive: _bare(data[drive] * 0.99)})[DISPLACEMENT]
         before = before.assign_coords({drive: ours[drive]} if drive in before.dims else {}).reset_coords(drop=True)
-    below = xr.zeros_like(ours, bool) if theirs is None else ours < 0.5 * theirs
-    return (ours < before * (1 - 1e-9)) & (ours > 0), below & (ours > 0)  # less is rounding
-
-
-def trend_text(falls: xr.DataArray, below: xr.DataArray, sliding: int) -> str:
-    """What the trends of `unsound` are, and of how many of the `sliding` cells; empty where there is none."""
-    trends = {"falls with A": falls, "lies below half of Newmark's": below}
-    parts = [f"{text} in {percent(int(one.sum()) / sliding)}" for text, one in trends.items() if one.any()]
-    return f"the displacement {' and '.join(parts)} of the sliding cells, a trend that no block has" if parts else ""
+    trends = {"falls with A": ours < before * (1 - 1e-9)}  # less is rounding
+    if theirs is not None:
+        trends["lies below half of Newmark's"] = ours < 0.5 * theirs
+    slides, cells, parts = drawn > 0, xr.zeros_like(drawn, bool), []
+    for text, trend in trends.items():
+        cells = cells | (found := trend & slides)
+        parts += [f"{text} in {percent(int(found.sum()) / int(slides.sum()))}"] if found.any() else []
+    text = f"the displacement {' and '.join(parts)} of the sliding cells, a trend that no block has" if parts else ""
+    return cells.transpose(*drawn.dims), text
 
 
 def percent(share: float) -> str:

@@ -36,7 +36,6 @@ def fragility(result: Result, options: Options) -> Figure:
 
 def draw_fragility(sheet: Sheet) -> Figure:
     """Curves of `exceedance_probability` of a slice, and the share of samples without a value, where there are any."""
-    sheet.set_axis("x")
     thresholds = sheet.data["threshold"]
     fixed = style.length_text(thresholds.item()) if thresholds.ndim == 0 else None
     for panel in sheet.panels:
@@ -60,7 +59,6 @@ def quantiles(result: Result, options: Options) -> Figure:
     """Bands between quantiles of the permanent displacement over one axis."""
     sheet = result.sheet(options, ["displacement_quantile", "valueless_share"], _AXES, keep=["quantile"])
     everything = sheet.data["displacement_quantile"].values * 1000.0
-    sheet.set_axis("x")
     shares = np.atleast_1d(sheet.data["quantile"].values)
     for panel in sheet.panels:
         floor = log_axis(panel.axes, everything, "permanent displacement (mm)", zeros=True)
@@ -92,7 +90,6 @@ def sensitivity(result: Result, options: Options) -> Figure:
     if bars:
         _draw_bars(sheet, symbols)
         return sheet.done()
-    sheet.set_axis("x")
     for panel in sheet.panels:
         panel.axes.grid(color="0.9")
         total, first = (panel.grid(name, "input", panel.x) for name, *_ in _INDICES)

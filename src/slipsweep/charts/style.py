@@ -68,13 +68,6 @@ MODE_TEXT = {
     SlidingMode.CONTINUOUS: "continuous",
 }
 
-#: Flags of values that are unreliable, left out unless requested, and what captions say of them.
-LEFT_OUT_TEXT = {
-    Validity.NOT_RECOUPLED: "not_recoupled (does not come to rest within the cycle)",
-    Validity.UPSLOPE: "upslope (ends above where it began)",
-}
-LEFT_OUT = Validity(sum(LEFT_OUT_TEXT))
-
 #: Other words of legends.
 NEWMARK, NO_SLIDING = "Newmark's block", MODE_TEXT[SlidingMode.STUCK]
 UNSOUND = "falls with A, or below\nhalf of Newmark's"

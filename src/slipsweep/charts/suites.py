@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from slipsweep.charts import solved, statistics, style
-from slipsweep.charts.sheet import Panel, Sheet, has_flags, log_axis, log_ticks, plot_curve, reliable
+from slipsweep.charts.sheet import Panel, Sheet, log_axis, log_ticks, plot_curve
 from slipsweep.charts.slices import Result
-from slipsweep.errors import InputError, did_you_mean
+from slipsweep.errors import InputError
 from slipsweep.model.variables import CAUTIONS, INTENSITY_MEASURES, STRENGTHS
 from slipsweep.studies.suite_statistics import SUITE, THRESHOLDS, suite_statistics, without_rounding
 
@@ -51,7 +51,6 @@ def motions(result: Result, options: style.Options) -> Figure:
     sheet.show(solved.DISPLACEMENT, "Not marked")
     if options.show_cautions:  # upslope ones lie below the axis, as zeros do
         sheet.data["drawn"] = sheet.data[solved.DISPLACEMENT]
-    sheet.set_axis("x")
     for panel in sheet.panels:
         floor = log_axis(panel.axes, _millimetres(sheet.data), _LABEL, zeros=True)
         lines = panel.data["drawn"].transpose(*SUITE, panel.x, missing_dims="ignore").values * 1000.0
@@ -70,8 +69,7 @@ def intensity(result: Result, options: style.Options) -> Figure:
     """The displacement against a measure of each motion as it shakes the block, and the regression of ln u on it."""
     measures = [name for name in INTENSITY_MEASURES if f"motion_{name}" in result.data.coords]
     measure = options.x or ("arias_intensity" if "pgv" in result.dims else "pgv")
-    if measure not in measures:
-        raise InputError(f"{result.name}: --x {measure}: no intensity measure; {did_you_mean(measure, measures)}")
+    result.known(measure, measures, f"--x {measure}: no intensity measure")
     factor = [] if "scale" in result.data.coords else ["motion_factor"]
     sheet = _sheet(result, replace(options, x=None), "motion", factor)
     drawn = [_scattered(panel, measure) for panel in sheet.panels]
@@ -145,6 +143,7 @@ def fragility(result: Result, options: style.Options) -> Figure:
     _note_cautions(sheet)
     drawn = Sheet(found, sheet.x, "threshold", options, sheet.across, sheet.down)
     drawn.notes = sheet.notes
+    drawn.set_axis("x")
     return statistics.draw_fragility(drawn)
 
 
@@ -200,7 +199,7 @@ def _scattered(panel: Panel, measure: str) -> tuple[style.Floats, style.Floats, 
     factor = np.abs(data["scale"] if "scale" in data.coords else data["motion_factor"])
     time = data["time_scale"] if "time_scale" in data.coords else 1.0
     xs = data[f"motion_{measure}"] * factor**power * time**time_power
-    ys = reliable(data, solved.DISPLACEMENT, panel.options) * 1000.0
+    ys = solved.reliable(data, solved.DISPLACEMENT, panel.options.show_cautions) * 1000.0
     every = xr.broadcast(xs, ys, data["polarity"] < 0)
     places, heights, reverse = (one.transpose(*every[1].dims).values.ravel() for one in every)
     there = np.isfinite(heights)
@@ -243,7 +242,7 @@ def _note_suite(sheet: Sheet, what: str, zeros_are: str = "") -> None:
 
 def _note_cautions(sheet: Sheet) -> None:
     """Which cautions the statistics have in them."""
-    shares = {flag: float(has_flags(sheet.data["validity"], flag).mean()) for flag in CAUTIONS}
+    shares = {flag: float(solved.has_flags(sheet.data["validity"], flag).mean()) for flag in CAUTIONS}
     texts = [f"{style.flag_name(flag)} {solved.percent(share)}" for flag, share in shares.items() if share]
     if texts:
         sheet.notes.append(f"Statistics are of all values, also those with a caution: {', '.join(texts)}.")

@@ -130,11 +130,8 @@ def _unsound_text(table: "xr.Dataset") -> str:
         return ""
     each = math.ceil((moved.size / _LOOKED_AT) ** (1.0 / max(moved.ndim, 1)))
     some = table.thin(dict.fromkeys(moved.dims, each)).load()
-    if "validity" in some:  # as charts leave out
-        reliable = some["validity"] & variables.Validity.NOT_RECOUPLED == 0
-        some[solved.DISPLACEMENT] = some[solved.DISPLACEMENT].where(reliable)
-    slides = max(int((some[solved.DISPLACEMENT] > 0).sum()), 1)
-    text = solved.trend_text(*solved.unsound(some, solved.newmark(some)), slides)
+    drawn = solved.reliable(some, solved.DISPLACEMENT)
+    _, text = solved.unsound(some.assign({solved.DISPLACEMENT: drawn}), drawn, solved.newmark(some))
     return text and f"unsound: {text}"
 
 
