@@ -54,7 +54,7 @@ def check_kind(kind: str) -> str:
 
 def fitting(result: Result, options: Options) -> list[str]:
     """The kinds that are drawn of a result if none is named; with one axis left, its curve."""
-    kinds = [*kinds_of(result.sort)]
+    kinds = kinds_of(result.sort)
     if result.sort != "sweep":
         return [kind for kind in kinds if kind != "sensitivity" or "total_index" in result.variables]
     if solved.DISPLACEMENT not in result.variables:

@@ -69,11 +69,11 @@ def _draw_motions(sheet: Sheet, panel: Panel) -> None:
     quantiles[np.isinf(quantiles)] = np.nan
     if panel.x != "motion":
         lines = limits.transpose(*SUITE, panel.x, missing_dims="ignore").values
-        draw_suite(sheet.legend, panel.axes, xs, lines / panel.g, quantiles)
+        draw_suite(sheet, panel.axes, xs, lines / panel.g, quantiles)
         return
     # no lines from motion to motion: a row of points for each polarity, and the quantiles across all of them
     ends = np.array([0.5, xs.size + 0.5])
-    draw_suite(sheet.legend, panel.axes, ends, np.empty((0, 2)), np.repeat(quantiles.reshape(-1, 1), 2, axis=1))
+    draw_suite(sheet, panel.axes, ends, np.empty((0, 2)), np.repeat(quantiles.reshape(-1, 1), 2, axis=1))
     panel.axes.set_xlim(*ends)
     points = limits.transpose("motion", ...).values.reshape(xs.size, -1)
     polarities = panel.data["polarity"].values if "polarity" in limits.dims else ()

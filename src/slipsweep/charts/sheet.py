@@ -160,22 +160,19 @@ class Panel:
 
 
 class Sheet(Drawing):
-    """A figure of panels that share their scales, of one slice, along its dimensions `across` and `down`.
+    """A figure of panels that share their scales, of one slice, across and down along the dimensions `along`.
 
     `x` and `y` are the axes of a map; of curves `y` is the curve parameter, or None.
     """
 
-    def __init__(
-        self, data: xr.Dataset, x: str, y: str | None, options: Options,
-        across: str | None = None, down: str | None = None,
-    ) -> None:  # fmt: skip
-        columns, rows = (data.sizes[dim] if dim else 1 for dim in (across, down))
+    def __init__(self, data: xr.Dataset, x: str, y: str | None, options: Options, along: Sequence[str]) -> None:
+        columns, rows = [*(data.sizes[dim] for dim in along), 1, 1][:2]
         size = (_WIDTH, 5.3) if rows == columns == 1 else (max(_WIDTH, 2.0 + 2.7 * columns), 2.0 + 2.5 * rows)
         super().__init__(options, rows, columns, size)
-        self.data, self.x, self.y, self.across, self.down = data, x, y, across, down
+        self.data, self.x, self.y, self.along = data, x, y, along
         self.panels: list[Panel] = []
         for (row, column), one in np.ndenumerate(self.grid):
-            where = {dim: at for dim, at in ((across, column), (down, row)) if dim}
+            where = dict(zip(along, (column, row), strict=False))
             self.panels.append(Panel(self, one, where))
             title = ", ".join(member_text(data, dim, at, options) for dim, at in where.items())
             if title:

@@ -212,7 +212,7 @@ class Result:
         for name in panels[:2]:
             self.known(name, [dim for dim in groups if dim not in kept], f"--panels {name}: must be another axis")
             kept[name] = places.get(name) or self.spread(name, _PANELS)
-        sheet = Sheet(self.select(names, kept, options.at), across, up, options, *panels[:2])
+        sheet = Sheet(self.select(names, kept, options.at), across, up, options, panels[:2])
         for side in ("x", "y") if y else () if isinstance(x, str) or across in NAMED else ("x",):
             sheet.set_axis(side)
         return sheet

@@ -109,7 +109,7 @@ def sensitivity(result: Result, options: Options) -> Figure:
 
 def _draw_bars(sheet: Sheet, symbols: list[str]) -> None:
     """Both indices of every input, the largest total index first."""
-    order = np.argsort(sheet.data["total_index"].sum([dim for dim in (sheet.across, sheet.down) if dim]).values)
+    order = np.argsort(sheet.data["total_index"].sum(sheet.along).values)
     for panel in sheet.panels:
         for (name, interval, text, colour), shift in zip(_INDICES, (0.2, -0.2), strict=True):
             values = panel.grid(name, "input")[order]

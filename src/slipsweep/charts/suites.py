@@ -17,6 +17,7 @@ from scipy import stats
 from slipsweep.charts import solved, statistics, style
 from slipsweep.charts.sheet import Panel, Sheet, log_axis, log_ticks, plot_curve
 from slipsweep.charts.slices import Result
+from slipsweep.charts.style import Floats, Look, Options
 from slipsweep.errors import InputError
 from slipsweep.model.variables import CAUTIONS, INTENSITY_MEASURES, STRENGTHS
 from slipsweep.studies.suite_statistics import SUITE, THRESHOLDS, suite_statistics, without_rounding
@@ -34,18 +35,18 @@ SCALING = {
 
 _LABEL = "permanent displacement (mm)"
 
-_THIN: style.Look = {"color": "0.5", "linewidth": 0.7, "zorder": 1.8}
-_BAND: style.Look = {"facecolor": "#BBD7EA", "linewidth": 0, "zorder": 1.0}
-_EDGE: style.Look = {"color": style.BLUE, "linewidth": 1.0, "linestyle": (0, (5, 2)), "zorder": 2.2}
-_MEDIAN: style.Look = {"color": style.BLUE, "linewidth": 2.4, "zorder": 2.3}
-_NEWMARK: style.Look = {"color": "black", "linewidth": 1.2, "linestyle": ":", "zorder": 2.4}
-_POINT: style.Look = {"marker": "o", "ms": 5, "color": style.BLUE}
-_REVERSED: style.Look = {"marker": "s", "ms": 5, "color": style.VERMILION, "markerfacecolor": "white"}
-_BELOW: style.Look = {"marker": "v", "color": "0.4", "markerfacecolor": "none", "gid": "below"}
-_BARS: style.Look = {"facecolor": "0.85", "edgecolor": "black", "linewidth": 1.0}
+_THIN: Look = {"color": "0.5", "linewidth": 0.7, "zorder": 1.8}
+_BAND: Look = {"facecolor": "#BBD7EA", "linewidth": 0, "zorder": 1.0}
+_EDGE: Look = {"color": style.BLUE, "linewidth": 1.0, "linestyle": (0, (5, 2)), "zorder": 2.2}
+_MEDIAN: Look = {"color": style.BLUE, "linewidth": 2.4, "zorder": 2.3}
+_NEWMARK: Look = {"color": "black", "linewidth": 1.2, "linestyle": ":", "zorder": 2.4}
+_POINT: Look = {"marker": "o", "ms": 5, "color": style.BLUE}
+_REVERSED: Look = {"marker": "s", "ms": 5, "color": style.VERMILION, "markerfacecolor": "white"}
+_BELOW: Look = {"marker": "v", "color": "0.4", "markerfacecolor": "none", "gid": "below"}
+_BARS: Look = {"facecolor": "0.85", "edgecolor": "black", "linewidth": 1.0}
 
 
-def motions(result: Result, options: style.Options) -> Figure:
+def motions(result: Result, options: Options) -> Figure:
     """Displacements over one axis: a thin line for each motion, median and 16 to 84 % band, and Newmark's median."""
     sheet = _sheet(result, options)
     sheet.show(solved.DISPLACEMENT, "Not marked")
@@ -54,7 +55,7 @@ def motions(result: Result, options: style.Options) -> Figure:
     for panel in sheet.panels:
         floor = log_axis(panel.axes, _millimetres(sheet.data), _LABEL, zeros=True)
         lines = panel.data["drawn"].transpose(*SUITE, panel.x, missing_dims="ignore").values * 1000.0
-        draw_suite(sheet.legend, panel.axes, panel.xs, lines, _band(panel.data, panel.x), floor)
+        draw_suite(sheet, panel.axes, panel.xs, lines, _band(panel.data, panel.x), floor)
         if "newmark_displacement" in panel.data:
             theirs = panel.data.assign({solved.DISPLACEMENT: panel.data["newmark_displacement"]})
             median = np.maximum(_band(theirs, panel.x)[1], floor)
@@ -65,7 +66,7 @@ def motions(result: Result, options: style.Options) -> Figure:
     return sheet.done()
 
 
-def intensity(result: Result, options: style.Options) -> Figure:
+def intensity(result: Result, options: Options) -> Figure:
     """The displacement against a measure of each motion as it shakes the block, and the regression of ln u on it."""
     measures = [name for name in INTENSITY_MEASURES if f"motion_{name}" in result.data.coords]
     measure = options.x or ("arias_intensity" if "pgv" in result.dims else "pgv")
@@ -82,31 +83,29 @@ def intensity(result: Result, options: style.Options) -> Figure:
         if wide:
             panel.axes.set_xscale("log")
             log_ticks(panel.axes.xaxis, there.max() / there.min())
-        panel.axes.grid(color="0.9")
         panel.axes.set_xlabel(f"{text} ({style.unit(measure)})")
         low = panel.axes.get_ylim()[0]
-        marks: dict[str, tuple[NDArray[np.bool_], style.Floats, style.Look]] = {
+        marks: dict[str, tuple[NDArray[np.bool_], Floats, Look]] = {
             "polarity 1" if negative.any() else "a motion": (~negative & (ys >= low), ys, _POINT),
             "polarity −1": (negative & (ys >= low), ys, _REVERSED),
             "zero, or below the axis": (ys < low, np.full_like(ys, low * 1.1), _BELOW),
         }
         for name, (which, heights, look) in marks.items():
             if which.any():
-                own: style.Look = {"gid": name, "linestyle": "", **look}
+                own: Look = {"gid": name, "linestyle": "", **look}
                 (sheet.legend[name],) = panel.axes.plot(xs[which], heights[which], **own)
         _draw_regression(sheet, panel, xs, ys)
     sheet.notes.append("Regression of ln u on the logarithm of the abscissa, of all motions that slide; "
                        "σ: standard deviation of ln u about it.")  # fmt: skip
     sheet.notes.append("Abscissa: of the motion as it shakes the block, with its factor and time scale.")
-    missing = int(np.count_nonzero(~np.isfinite(places)))
-    if missing:
+    if missing := np.count_nonzero(~np.isfinite(places)):
         sheet.notes.append(f"{missing} of {places.size} have no {text}: the samples resolve none.")
     _note_suite(sheet, "Drawn are", "they are marked at the lower edge")
     sheet.note_left_out(solved.DISPLACEMENT)
     return sheet.done()
 
 
-def histogram(result: Result, options: style.Options) -> Figure:
+def histogram(result: Result, options: Options) -> Figure:
     """How many motions of a suite have which displacement, with the share of zeros."""
     sheet = _sheet(result, options, "motion")
     everything = _millimetres(sheet.data)
@@ -135,19 +134,19 @@ def histogram(result: Result, options: style.Options) -> Figure:
     return sheet.done()
 
 
-def fragility(result: Result, options: style.Options) -> Figure:
+def fragility(result: Result, options: Options) -> Figure:
     """The share of the motions of a suite that exceed a displacement, over one axis."""
     sheet = _sheet(result, options)
     found = suite_statistics(sheet.data, thresholds=options.heights or THRESHOLDS)
     _note_suite(sheet, "P is the share of")
     _note_cautions(sheet)
-    drawn = Sheet(found, sheet.x, "threshold", options, sheet.across, sheet.down)
+    drawn = Sheet(found, sheet.x, "threshold", options, sheet.along)
     drawn.notes = sheet.notes
     drawn.set_axis("x")
     return statistics.draw_fragility(drawn)
 
 
-def _sheet(result: Result, options: style.Options, x: str | None = None, more: Sequence[str] = ()) -> Sheet:
+def _sheet(result: Result, options: Options, x: str | None = None, more: Sequence[str] = ()) -> Sheet:
     """A slice, along `x`, or along how strong the motions are, else Üy or ky, or any axis."""
     axes = [dim for dim in (*STRENGTHS, "yield_acceleration", "yield_coefficient", *result.wide) if dim not in SUITE]
     sheet = result.sheet(options, [*result.compared(solved.DISPLACEMENT), *more], x or axes, keep=SUITE)
@@ -158,10 +157,7 @@ def _sheet(result: Result, options: style.Options, x: str | None = None, more: S
     return sheet
 
 
-def draw_suite(
-    legend: dict[str, Any], axes: Axes, xs: style.Floats, lines: style.Floats, quantiles: style.Floats,
-    floor: float = 0.0,
-) -> None:  # fmt: skip
+def draw_suite(sheet: Sheet, axes: Axes, xs: Floats, lines: Floats, quantiles: Floats, floor: float = 0.0) -> None:
     """A thin line for each motion of `lines`, and median and band (16, 50 and 84 %) over them, none below `floor`."""
     lines, quantiles = np.maximum(lines, floor).reshape(-1, xs.size), np.maximum(quantiles, floor)
     axes.fill_between(xs, quantiles[0], quantiles[2], gid="band", **_BAND)
@@ -170,10 +166,10 @@ def draw_suite(
     for edge in (quantiles[0], quantiles[2]):
         axes.plot(xs, edge, gid="edge", **_EDGE)
     plot_curve(axes, xs, quantiles[1], gid="median", **_MEDIAN)
-    legend["median"] = Line2D([], [], **_MEDIAN)
-    legend["16 to 84 %"] = Patch(facecolor=_BAND["facecolor"], edgecolor=style.BLUE, linestyle="--")
+    sheet.legend["median"] = Line2D([], [], **_MEDIAN)
+    sheet.legend["16 to 84 %"] = Patch(facecolor=_BAND["facecolor"], edgecolor=style.BLUE, linestyle="--")
     if len(lines):
-        legend["a motion"] = Line2D([], [], **_THIN)
+        sheet.legend["a motion"] = Line2D([], [], **_THIN)
 
 
 def suite_text(sizes: Mapping[Hashable, int]) -> str:
@@ -182,17 +178,17 @@ def suite_text(sizes: Mapping[Hashable, int]) -> str:
     return f"{sizes['motion']} motions{polarities}"
 
 
-def _band(data: xr.Dataset, x: str) -> style.Floats:
+def _band(data: xr.Dataset, x: str) -> Floats:
     """The suite's quantiles along an axis, mm."""
     return np.asarray(suite_statistics(data)["displacement_quantile"].transpose("quantile", x)) * 1000.0
 
 
-def _millimetres(data: xr.Dataset) -> style.Floats:
+def _millimetres(data: xr.Dataset) -> Floats:
     values = data[solved.DISPLACEMENT].values.ravel() * 1000.0
     return np.asarray(values[np.isfinite(values)], np.float64)
 
 
-def _scattered(panel: Panel, measure: str) -> tuple[style.Floats, style.Floats, NDArray[np.bool_]]:
+def _scattered(panel: Panel, measure: str) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     """Intensity as it shakes the block, displacement in mm, and whether the motion is reversed, of all drawn."""
     data = panel.data
     power, time_power = SCALING[measure]
@@ -206,7 +202,7 @@ def _scattered(panel: Panel, measure: str) -> tuple[style.Floats, style.Floats, 
     return places[there], heights[there], reverse[there]
 
 
-def _draw_regression(sheet: Sheet, panel: Panel, xs: style.Floats, ys: style.Floats) -> None:
+def _draw_regression(sheet: Sheet, panel: Panel, xs: Floats, ys: Floats) -> None:
     """The line of ln u = a + b ln(measure), its R² and scatter over the panel."""
     slid = (ys > 0) & (xs > 0) & np.isfinite(xs)
     if slid.sum() < 3:
@@ -219,7 +215,7 @@ def _draw_regression(sheet: Sheet, panel: Panel, xs: style.Floats, ys: style.Flo
         scatter = float(np.sqrt(np.sum(rest**2) / (rest.size - 2)))
         ends = np.geomspace(xs[slid].min(), xs[slid].max(), 50)
         line = np.exp(found.intercept) * ends**found.slope
-        look: style.Look = {"color": "0.2", "linewidth": 1.2, "linestyle": (0, (6, 2))}
+        look: Look = {"color": "0.2", "linewidth": 1.2, "linestyle": (0, (6, 2))}
         sheet.remarks["regression"] = panel.axes.plot(ends, line, gid="regression", **look)[0]
         panel.add_title(f"slope {found.slope:.2f}, R² = {found.rvalue**2:.2f}, σ = {scatter:.2f}")
 
