@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -24,9 +25,6 @@ _COLUMNS = (
     "relative displacement (mm)."
 )
 
-Offset = Annotated[Texts, TEST("Channel with an offset, or all; may be repeated.", "CHANNEL")]
-Drift = Annotated[Texts, TEST("Channel that drifts linearly, or all; may be repeated.", "CHANNEL")]
-
 #: Slides as a table: results, and what stands above, as wide as the column.
 _SLIDES = {
     "slide_onset": "    onset",
@@ -40,7 +38,24 @@ _SLIDES = {
 
 #: Parameters that a calibration finds, and those of a cycle.
 _FOUND = ("yield_acceleration", "decay_rate", "delta_mu")
-_OF_CYCLES = (*_FOUND, "attenuation_coefficient")
+_OF_CYCLES = ("start", *_FOUND, "attenuation_coefficient")
+
+
+@dataclass(frozen=True)
+class Measured:
+    """The block of a test, and what its channels have wrong."""
+
+    theta: Annotated[str, options.THETA]
+    mu_s: options.MuS = None
+    phi: options.Phi = None
+    offset: Annotated[Texts, TEST("Channel with an offset, or all; may be repeated.", "CHANNEL")] = None
+    drift: Annotated[Texts, TEST("Channel that drifts linearly, or all; may be repeated.", "CHANNEL")] = None
+
+    def given(self, g: float) -> dict[str, Any]:
+        """The same as Python's functions take it."""
+        removed = (("offset", self.offset), ("drift", self.drift))
+        channels = {name: "all" if one == ["all"] else one or [] for name, one in removed}
+        return vars(self) | options.in_own_units(vars(self), g) | channels
 
 
 @command(
@@ -51,12 +66,8 @@ _OF_CYCLES = (*_FOUND, "attenuation_coefficient")
 def friction(
     *,
     test: Annotated[Path, options.read("TEST.csv", _COLUMNS)],
-    theta: Annotated[str, options.THETA],
-    mu_s: options.MuS = None,
-    phi: options.Phi = None,
+    measured: Measured,
     g: Annotated[float, options.BLOCK("Gravity, m/s².")] = 9.81,
-    offset: Offset = None,
-    drift: Drift = None,
     rest: Annotated[Text, TEST("Times of rest, s, to find offsets and drifts by.", "FROM:TO")] = None,
     threshold: Annotated[
         Text, TEST("Relative acceleration of a slide: 0.02g (default: 4 times its noise).", "VALUE")
@@ -66,7 +77,7 @@ def friction(
     quiet: options.Quiet = False,
 ) -> None:
     """Compute the friction over a test by Eq. 1 and by statics, and its slides."""
-    block = options.in_own_units({"theta": theta, "phi": phi}, g) | {"mu_s": mu_s}
+    given = measured.given(g)
     least = None if threshold is None else quantity("--threshold", threshold, "m s-2", g)
     paths = common.check_outputs(output, (".nc", *FIGURES), overwrite, [test])
     from slipsweep.studies.friction import measured_friction
@@ -78,45 +89,39 @@ def friction(
         except ValueError:
             raise InputError(f"--rest {rest}: must be two times, s, as FROM:TO") from None
         span = first, last
-    table = measured_friction(test, **block, g=g, **_removed(offset, drift), rest=span, threshold=least)
+    table = measured_friction(test, **given, g=g, rest=span, threshold=least)
     common.write_outputs(paths, overwrite, table)
     if quiet:
         return
     attrs, slides = table.attrs, table[[*_SLIDES]].to_dataframe()[[*_SLIDES]].rename(columns=_SLIDES)
     threshold = f"threshold  {attrs['threshold']:.4g} m/s2: {attrs['threshold_from']}"
     _echo_coefficients(table, threshold, f"removed    {attrs['removed']}")
-    echo(f"{len(slides)} slides{', s and m/s2:' if len(slides) else ''}")
     rows = slides.to_string(index=False, na_rep="nan", float_format="{:.4g}".format)
-    echo(*([rows] if len(slides) else ()), *paths)
+    echo(f"{len(slides)} slides, s and m/s2:\n{rows}" if len(slides) else "0 slides", *paths)
 
 
 @command(
     "Tests on a shaking table",
     "slipsweep calibrate test.csv --theta 5 --mu-s 0.38 -o calibration.nc -o calibration.png",
     "slipsweep calibrate strong.csv weak.csv --theta 5 --mu-s 0.38 --drift relative_displacement -o model.toml",
-    model=MODELS,
 )
 def calibrate(
     *,
     tests: Annotated[list[Path], options.read("TEST.csv...", f"{_COLUMNS} One at least of the block's.")],
-    theta: Annotated[str, options.THETA],
-    mu_s: options.MuS = None,
-    phi: options.Phi = None,
-    offset: Offset = None,
-    drift: Drift = None,
+    measured: Measured,
     cycles: Annotated[bool, TEST("Fit each cycle separately, too.")] = True,
     output: Annotated[options.Paths, written("Write .nc, .toml, .png, .svg or .pdf; may be repeated.")] = None,
     overwrite: options.Overwrite = False,
-    model: Model,
+    model: Annotated[Model, MODELS],
     quiet: options.Quiet = False,
 ) -> None:
     """Estimate yield acceleration, λ and Δμ from one or several tests."""
-    block = options.in_own_units({"theta": theta, "phi": phi}, model.g) | {"mu_s": mu_s}
+    given = measured.given(model.g)
     paths = common.check_outputs(output, (".nc", ".toml", *FIGURES), overwrite, tests)
     from slipsweep.studies.calibration import calibrate as calibrated
     from slipsweep.studies.calibration import sweep_file_text
 
-    table = calibrated(tests, **block, model=model, **_removed(offset, drift), cycles=cycles)
+    table = calibrated(tests, **given, model=model, cycles=cycles)
     text = sweep_file_text(table.attrs["model_table"], table.attrs["uncertainty_table"])
     common.write_outputs(paths, overwrite, table, toml=lambda: text)
     if quiet:
@@ -144,19 +149,13 @@ def calibrate(
     for number in range(table.sizes.get("test", 1)) if "cycle_start" in table else ():
         fitted = table.isel(test=number, missing_dims="ignore")
         echo("cycle  starts, s     Üy, m/s2       λ      Δμ      Kd")
-        columns = [fitted[f"cycle_{name}"].values for name in _OF_CYCLES]
-        for at, start in enumerate(fitted["cycle_start"].values):
+        rows = zip(*(fitted[f"cycle_{name}"].values for name in _OF_CYCLES), strict=True)
+        for at, (start, *found) in enumerate(rows, 1):
             if math.isfinite(start):
-                cells = (_number(column[at], ".3g") for column in columns)
-                echo("{:5d} {:10.4g} {:>12} {:>7} {:>7} {:>7}".format(at + 1, start, *cells))
+                echo("{:5d} {:10.4g} {:>12} {:>7} {:>7} {:>7}".format(at, start, *map(_number, found)))
     constant = table.attrs["constant_friction"]
     echo(*(f"note: {finding}" for finding in table.attrs["findings"].splitlines() if finding != constant))
     echo("", text, *paths)
-
-
-def _removed(offset: list[str] | None, drift: list[str] | None) -> dict[str, Any]:
-    """What is taken off the channels of a test, as Python's functions take it."""
-    return {name: "all" if one == ["all"] else one or [] for name, one in (("offset", offset), ("drift", drift))}
 
 
 def _echo_coefficients(table: "xr.Dataset", *lines: str) -> None:
@@ -169,5 +168,5 @@ def _echo_coefficients(table: "xr.Dataset", *lines: str) -> None:
             echo(f"{kind + ' friction by statics':<28}{value:.3f}   95 %: {low:.3f} to {high:.3f}")
 
 
-def _number(value: float, form: str) -> str:
+def _number(value: float, form: str = ".3g") -> str:
     return format(value, form) if math.isfinite(value) else "-"

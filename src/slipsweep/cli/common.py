@@ -3,7 +3,6 @@
 import io
 import shlex
 import sys
-import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from slipsweep.cli.options import Large, displacements
+from slipsweep.cli.options import Large, Paths, displacements
 from slipsweep.errors import InputError
 from slipsweep.files import outputs
 from slipsweep.model import variables
@@ -30,9 +29,7 @@ if TYPE_CHECKING:
 FIGURES = (".png", ".svg", ".pdf")
 
 
-def check_outputs(
-    output: Sequence[Path] | None, endings: Sequence[str], overwrite: bool, reads: Sequence[Path | int]
-) -> list[Path]:
+def check_outputs(output: Paths, endings: Sequence[str], overwrite: bool, reads: Sequence[Path | int]) -> list[Path]:
     """Refuse outputs that cannot be written, before anything is computed; return those that there are."""
     paths = list(output or ())
     outputs.check_endings(paths, endings)
@@ -41,24 +38,20 @@ def check_outputs(
 
 
 def write_outputs(
-    paths: Sequence[Path],
+    paths: list[Path],
     overwrite: bool,
     table: "xr.Dataset",
     recorded: "Record | None" = None,
     **texts: Callable[[], str],
 ) -> None:
-    """Write each output of a command, complete or not at all.
-
-    As the text of its ending, as a netCDF file, with the `recorded` motion that it is the response to, or as the chart
-    of the table, which is drawn once.
-    """
+    """Write each output: the text of its ending, a netCDF file (with the record that is the input), or the chart."""
     from slipsweep.files import netcdf
 
     figure = None
     for path in paths:
         with outputs.complete_or_absent(path, overwrite) as temporary:
-            if path.suffix[1:] in texts:
-                temporary.write_text(texts[path.suffix[1:]](), encoding="utf-8")
+            if text := texts.get(path.suffix[1:]):
+                temporary.write_text(text(), encoding="utf-8")
             elif path.suffix == ".nc":
                 plain, title = netcdf.without_time_axis(table), table.attrs["title"]
                 found = netcdf.described(plain, title=title, command=typed_command(), recorded=recorded)
@@ -66,7 +59,7 @@ def write_outputs(
             else:
                 from slipsweep.charts import kinds
 
-                figure = figure or kinds.figure_of(table)
+                figure = figure or kinds.figure_of(table)  # drawn once
                 save(figure, temporary, path.suffix)
 
 
@@ -77,20 +70,18 @@ def save(figure: "Figure", path: Path, ending: str) -> None:
     path.write_bytes(content.getvalue())
 
 
-def run_job(job: "Job", path: "Place", large: Large, *, overwrite: bool, quiet: bool, unit: str = "cells") -> "Report":
+def run_job(job: "Job", path: "Place", large: Large, unit: str = "cells") -> "Report":
     """Solve and write what a command computes, in chunks if need be."""
     from slipsweep.files import running
     from slipsweep.grid.resources import parse_size
 
-    if large.resume and overwrite:
+    if large.resume and large.overwrite:
         raise InputError("--resume, --overwrite: the first continues an interrupted run, the second starts it again")
-    nbytes = None if large.memory is None else parse_size("--memory", large.memory)
-    with progress_bar(job.plan.cells, quiet, unit) as progress:
-        report = running.run(
-            job, path, command=typed_command(), overwrite=overwrite, resume=large.resume, memory=nbytes,
-            workers=large.workers, scheduler=large.scheduler, progress=progress,
-        )  # fmt: skip
-    if report.found and not quiet:
+    given = {name: value for name, value in vars(large).items() if name != "quiet"}
+    given["memory"] = None if large.memory is None else parse_size("--memory", large.memory)
+    with progress_bar(job.plan.cells, large.quiet, unit) as progress:
+        report = running.run(job, path, command=typed_command(), progress=progress, **given)
+    if report.found and not large.quiet:
         echo(f"{path}: complete already, by the same sweep; nothing was computed")
     return report
 
@@ -113,11 +104,12 @@ def progress_bar(cells: int, quiet: bool, unit: str = "cells") -> Iterator[Calla
 
     from slipsweep.jit import compiling
 
-    passed = stopwatch()
+    before = compiling.seconds
 
     def advance(more: int) -> None:
-        done = bar.tasks[task].completed + more
-        bar.update(task, completed=done, description=f"{done / passed()[0]:.3g} {unit}/s")
+        bar.advance(task, more)
+        solving = (bar.tasks[task].elapsed or 0.0) - (compiling.seconds - before)
+        bar.update(task, description=f"{bar.tasks[task].completed / max(solving, 1e-9):.3g} {unit}/s")
 
     class Doing(ProgressColumn):
         """How fast cells are solved, or which kernel is compiled."""
@@ -130,19 +122,6 @@ def progress_bar(cells: int, quiet: bool, unit: str = "cells") -> Iterator[Calla
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=cells)
         yield advance
-
-
-def stopwatch() -> Callable[[], tuple[float, float]]:
-    """What tells the seconds since now: those without compilation, which are never 0, and those of compilation."""
-    from slipsweep.jit import compiling
-
-    started, before = time.perf_counter(), compiling.seconds
-
-    def passed() -> tuple[float, float]:
-        once = compiling.seconds - before
-        return max(time.perf_counter() - started - once, 1e-9), once
-
-    return passed
 
 
 def echo(*texts: object, err: bool = False) -> None:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _MOST_POINTS, _MOST_MOTIONS = 12, 60
 
 
-@options.command("Compute", "slipsweep limit design_chart.nc --displacement 50mm -o limit.nc -o limit.png", large=Large)
+@options.command("Compute", "slipsweep limit design_chart.nc --displacement 50mm -o limit.nc -o limit.png")
 def limit(
     *,
     sweep: Annotated[Path, read("OUT.nc|SWEEP.toml", "A result or sweep file: its model and axes but amplitude.")],
@@ -27,8 +27,6 @@ def limit(
     maximum_amplitude: Annotated[
         Text, options.Panel("Limit")("End of the search: 2g, 15 (m/s²).  [default: 5g]", "ACCELERATION")
     ] = None,
-    overwrite: options.Overwrite = False,
-    quiet: options.Quiet = False,
     large: Large,
 ) -> None:
     """Find the limiting PGA for a tolerable displacement.
@@ -41,25 +39,25 @@ def limit(
     results = [one for one in output or () if Path(one).suffix in (".nc", ".zarr")]
     if len(results) > 1:
         raise InputError(f"{results[1]}: a second result, beside {results[0]}; give one")
-    for name in () if results else (name for name, value in vars(large).items() if value):
-        raise InputError(f"--{name}: needs -o OUT.nc, whose chunks are solved and written one after the other")
+    for name in () if results else ("resume", "memory", "workers", "scheduler"):
+        if getattr(large, name):
+            raise InputError(f"--{name}: needs -o OUT.nc, whose chunks are solved and written one after the other")
     checked = spec.load(sweep)
     named = [Path(one) for one in output or () if one not in results]
-    figures = common.check_outputs(named, (*FIGURES, ".nc", ".zarr"), overwrite, checked.files)
+    figures = common.check_outputs(named, (*FIGURES, ".nc", ".zarr"), large.overwrite, checked.files)
     g = checked.model.g
     lengths = options.displacements(displacement, g)
     highest = None if maximum_amplitude is None else quantity("--maximum-amplitude", maximum_amplitude, "m s-2", g)
     # one is one number; several are a dimension, in order and without repetition
     job = jobs.limit_job(checked, lengths if len(displacement) > 1 else lengths[0], highest)
     if results:
-        place = opening.place_of(results[0])
-        table = opening.read_result(common.run_job(job, place, large, overwrite=overwrite, quiet=quiet).path)
+        table = opening.read_result(common.run_job(job, opening.place_of(results[0]), large).path)
     else:
-        with spec.named(checked.source), common.progress_bar(job.plan.cells, quiet) as progress:
+        with spec.named(checked.source), common.progress_bar(job.plan.cells, large.quiet) as progress:
             table = job.plan.solve(progress)
     labelled = table.assign_coords(label=("case", list(job.labels))) if job.labels else table
-    common.write_outputs(figures, overwrite, labelled)
-    if quiet:
+    common.write_outputs(figures, large.overwrite, labelled)
+    if large.quiet:
         return
     limits, status = table["limit_amplitude"], table["limit_status"]
     echo(f"{limits.size} limits ({grid_text({str(dim): size for dim, size in limits.sizes.items()}) or 'one cell'})")
@@ -92,11 +90,10 @@ def _summarize_suite(table: "xr.Dataset", g: float) -> None:
     counts, beyond = (found[name].values.ravel() for name in ("value_count", "not_reached_count"))
     width = max(24, *map(len, names))
     echo("16 %, median and 84 % of the suite, m/s2 (g); a limit not reached is larger than all others:")
-    rows = [*zip(points, quantiles, counts, beyond, each, strict=True)]
-    for point, values, count, more, motions in rows[:_MOST_POINTS]:
-        of = f"of {count}" + (f", {more} of them not reached" if more else "")
-        echo(f"  {point + ': ' if point else ''}{', '.join(map(text, values))} {of}")
-        for name, value in zip(names, motions, strict=True) if each.size <= _MOST_MOTIONS else ():
+    for at, point in enumerate(points[:_MOST_POINTS]):
+        of = f"of {counts[at]}" + (f", {beyond[at]} of them not reached" if beyond[at] else "")
+        echo(f"  {point + ': ' if point else ''}{', '.join(map(text, quantiles[at]))} {of}")
+        for name, value in zip(names, each[at], strict=True) if each.size <= _MOST_MOTIONS else ():
             echo(f"    {name.removeprefix('motion = '):<{width}}{text(value)}")
-    if len(rows) > _MOST_POINTS:
-        echo(f"  and {len(rows) - _MOST_POINTS} grid points more")
+    if len(points) > _MOST_POINTS:
+        echo(f"  and {len(points) - _MOST_POINTS} grid points more")

@@ -5,9 +5,9 @@ import inspect
 import itertools
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import typer
 
@@ -71,6 +71,8 @@ At = Annotated[Texts, Panel("Selection")(_AT, "NAME=VALUE")]
 class Large:
     """Options of commands that may run for hours."""
 
+    overwrite: Overwrite = False
+    quiet: Quiet = False
     resume: Annotated[bool, LARGE("Continue an interrupted run from its finished chunks.", None, "--resume")] = False
     memory: Annotated[Text, LARGE("Memory limit: 512MiB, 2GB (default: 500 to 600 MB).", "SIZE")] = None
     workers: Annotated[int | None, LARGE("Solve on N processes of this machine (extra [cluster]).", "N")] = None
@@ -117,23 +119,23 @@ def option_name(text: str) -> str:
     return names.sub(lambda found: "--" + found[0].replace("_", "-").replace("+ ", "+ --"), text, count=1)
 
 
-def command(
-    task: str, *examples: str, **choices: Family[Any] | type[Any]
-) -> Callable[[Callable[..., None]], Callable[..., None]]:
+def command(task: str, *examples: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Add a command to the program, by what it is for; its examples stand below its help.
 
-    In place of parameters that are `choices` it has the options that are declared for them.  It gets the choice made
-    of a family, or None if its default is None and none of the options was typed; of a single choice (`Reading`) the
-    options typed, by name; of another dataclass, whose annotations are options of typer, an object.
+    In place of parameters annotated with a family or a dataclass it has the options that these declare.  It gets the
+    choice made of a family, or None if its default is None and none of the options was typed; of a single choice
+    (`Reading`) the options typed, by name; of another dataclass, whose annotations are options of typer, an object.
     """
 
     def add(function: Callable[..., None]) -> Callable[..., None]:
         @functools.wraps(function, assigned=("__module__", "__name__", "__doc__"))
-        def run(**given: Any) -> None:
-            function(**{name: _made(given, choice) for name, choice in choices.items()}, **given)
+        def run(**typed: Any) -> None:
+            function(**{name: _made(typed, choice) for name, choice in choices.items()}, **typed)
 
-        given = inspect.signature(function).parameters.items()
-        expanded = (_options(choices[name], one.default) if name in choices else [one] for name, one in given)
+        given = inspect.signature(function).parameters
+        kinds = {name: (get_args(one.annotation) or (one.annotation,))[-1] for name, one in given.items()}
+        choices = {name: kind for name, kind in kinds.items() if isinstance(kind, Family | type)}
+        expanded = (_options(choices[name], one.default) if name in choices else [one] for name, one in given.items())
         run.__signature__ = inspect.Signature([*itertools.chain(*expanded)])  # type: ignore[attr-defined]
         app.command(rich_help_panel=task, epilog="\n\n".join(("Examples:", *examples)))(run)
         return function
@@ -151,7 +153,7 @@ def _made(given: dict[str, Any], choice: Family[Any] | type[Any]) -> Any:
             name or choice.default, typed, lambda text: option_name(text.replace(choice.key, choice.attribute, 1))
         )
     if not issubclass(choice, Choice):
-        return choice(**{one.name: given.pop(one.name) for one in fields(choice)})
+        return choice(**{name: given.pop(name) for name in inspect.signature(choice).parameters})
     typed = _typed(given, {one.name: one for one in declared(choice)})
     try:
         choice(**typed)
@@ -176,7 +178,7 @@ def _options(choice: Family[Any] | type[Any], default: Any) -> list[inspect.Para
     if not isinstance(choice, Family):
         if issubclass(choice, Choice):
             return [_declared(one, RARE) for one in declared(choice)]
-        return [_parameter(one.name, annotation=one.type, default=one.default) for one in fields(choice)]
+        return [one.replace(kind=one.KEYWORD_ONLY) for one in inspect.signature(choice).parameters.values()]
     panel = SHAKING if choice.attribute == "waveform" else BLOCK
     names: Any = Literal[tuple(choice.names)]
     note, first = (f" (default: {choice.default})", None) if default is None else ("", choice.default)

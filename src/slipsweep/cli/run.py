@@ -1,6 +1,7 @@
 """`slipsweep example` and `slipsweep run`: the sweep files that come with slipsweep, and a sweep computed."""
 
 import math
+import time
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -8,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from slipsweep.cli import common, options
 from slipsweep.cli.common import echo, range_text
-from slipsweep.cli.options import Large, Panel
+from slipsweep.cli.options import Large
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files import outputs
 from slipsweep.model import variables
@@ -58,24 +59,22 @@ def example(
     "slipsweep run sweeps/design_chart.toml",
     "slipsweep run sweeps/paper.toml -o paper.nc --overwrite",
     "slipsweep run design_chart.nc -o again.nc --quiet",
-    large=Large,
 )
 def run(
     *,
     sweep: Annotated[Path, options.read("SWEEP.toml|OUT.nc", "Sweep file (-: standard input), or a result to repeat.")],
     solver: Annotated[
-        Literal["auto", "step", "cycle"] | None, Panel("Solver")("Solver, instead of solver.method.")
+        Literal["auto", "step", "cycle"] | None, options.Panel("Solver")("Solver, instead of solver.method.")
     ] = None,
     output: Annotated[
         str | None, options.written("File or store to write (default: output.path, else SWEEP.nc).", "OUT.nc|OUT.zarr")
     ] = None,
-    overwrite: options.Overwrite = False,
-    quiet: options.Quiet = False,
     large: Large,
 ) -> None:
     """Compute a sweep and write it to a netCDF file or a Zarr store."""
     from slipsweep.files import jobs, opening, spec, storing
     from slipsweep.grid.resources import grid_text, size_text
+    from slipsweep.jit import compiling
 
     checked = spec.load(sweep)
     if solver is not None and checked.recorded is not None:
@@ -87,16 +86,18 @@ def run(
         raise InputError(f"{sweep}: a sweep from a pipe has no name; name the output with -o or output.path")
     path = opening.place_of(name or f"{sweep.stem}.nc")
     outputs.check_endings([path], (".nc", ".zarr") if isinstance(path, Path) else (".zarr",))
-    passed, sampling, job = common.stopwatch(), checked.sampling, jobs.sweep_job(checked)
+    started, compiled_before = time.perf_counter(), compiling.seconds
+    sampling, job = checked.sampling, jobs.sweep_job(checked)
     unit = "cells" if sampling is None else "samples"
-    report = common.run_job(job, path, large, overwrite=overwrite, quiet=quiet, unit=unit)
-    if quiet:
+    report = common.run_job(job, path, large, unit)
+    if large.quiet:
         return
     template = job.plan.template()
     if not report.found:
-        cells, grid, (solving, once) = job.plan.cells, grid_text(job.plan.sizes) or "no axes", passed()
+        cells, grid = job.plan.cells, grid_text(job.plan.sizes) or "no axes"
+        passed, once = time.perf_counter() - started, compiling.seconds - compiled_before
         compiled = f" ({once:.2f} s to compile, once)" if once > 0.0 else ""
-        took = f"in {solving + once:.2f} s{compiled}, {cells / solving:.3g} {unit}/s"
+        took = f"in {passed:.2f} s{compiled}, {cells / max(passed - once, 1e-9):.3g} {unit}/s"
         if sampling is None:
             echo(f"{cells} cells ({grid}) {took}")
         else:

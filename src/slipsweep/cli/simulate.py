@@ -50,18 +50,14 @@ class Typed:
     "Compute",
     "slipsweep simulate --theta 5 --mu-s 0.38 --amplitude 3.55 --frequency 1.8 -o a.png -o a.csv",
     "slipsweep simulate --theta 5 --mu-s 0.38 --record motion.AT2 --scale 2 -o history.nc",
-    typed=Typed,
-    excitation=WAVEFORMS,
-    model=MODELS,
-    reading=Reading,
 )
 def simulate(
     *,
     typed: Typed,
-    model: Model,
-    excitation: Waveform | None = None,
+    model: Annotated[Model, MODELS],
+    excitation: Annotated[Waveform | None, WAVEFORMS] = None,
     record: Annotated[File, SHAKING("A recorded motion: CSV, PEER AT2, K-NET, COSMOS or ESM text.", "FILE")] = None,
-    reading: Mapping[str, Any],
+    reading: Annotated[Mapping[str, Any], Reading],
     output: Annotated[options.Paths, options.written("Write .nc, .csv, .png, .svg or .pdf; may be repeated.")] = None,
     overwrite: options.Overwrite = False,
     points: Annotated[int | None, OUTPUT("Points in time per cycle of a waveform (default: 512).", min=4)] = None,
@@ -84,8 +80,7 @@ def simulate(
         recorded = None if record is None else read_record(record, **reading)
     except InputError as error:  # options as they are typed: --gaps linear for gaps = 'linear'
         raise InputError(re.sub(r"\b(\w+) = '([^']*)'", r"--\1 \2", str(error))) from None
-    given: dict[str, Any] = vars(typed) | with_unit
-    given["excitation"] = recorded or excitation or WAVEFORMS.of(WAVEFORMS.default)
+    given: dict[str, Any] = {**vars(typed), **with_unit, "excitation": recorded or excitation or WAVEFORMS.default}
     table = simulated(**given, model=model, points_per_cycle=points)
     validity = variables.Validity(table["validity"].item())
     if flags := validity & variables.VALUELESS:
