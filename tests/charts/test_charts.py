@@ -547,6 +547,18 @@ def test_cases_tell_curves_and_panels_apart() -> None:
             result.slipsweep.chart("contours", **options)
 
 
+def test_what_is_not_to_be_read_is_said() -> None:
+    """A coarse grid, estimated friction in continuous sliding; a slice at another friction angle is solved."""
+    coarse = slipsweep.sweep(5.0, 0.3, [1.0, 3.0, 4.0, 9.0], [1.0, 2.0, 4.0])
+    text = caption(coarse.slipsweep.chart("contours"))
+    assert "Coarse grid: values grow more than tenfold from cell to cell" in text
+    assert "of the sliding cells slide continuously with estimated friction: not for design." in text
+    angles = slipsweep.sweep(5.0, phi=[20.0, 24.0], amplitude=[2.0, 4.0, 6.0], frequency=[1.0, 2.0])
+    slices = Result(angles, "angles").select(["permanent_displacement"], {"amplitude": slice(None)}, {"phi": 22.0})
+    own = slipsweep.sweep(5.0, phi=22.0, amplitude=[2.0, 4.0, 6.0], frequency=1.0)
+    np.testing.assert_array_equal(slices.permanent_displacement, own.permanent_displacement)
+
+
 def test_little_to_draw(grid: xr.Dataset) -> None:
     """All zero, all missing, one value: what can be drawn is, and the rest says why."""
     small = slipsweep.sweep([0.0, 5.0, 30.0], [0.3, 0.5], [1.0, 2.0, 4.0, 7.0], [1.0, 2.0, 4.0])

@@ -89,6 +89,7 @@ def test_baseline() -> None:
     ("name", "text", "options", "message"),
     [
         ("a.csv", "0,1\n1,2\n", {}, "units: must be given"),
+        ("a.csv", "time (ms),a (g)\n0,1\n1,2\n", {}, "time in ms: must be in s"),
         ("a.csv", "t,a (g)\n0,1\n1,2\n", {"units": "gal"}, "the file itself says 'g'; correct its header"),
         ("a.csv", "0,1\n1,x\n", {"units": "g"}, "line 2: '1,x'"),
         ("a.csv", "0,1\n1,\n", {"units": "g"}, "first at t = 1 s"),

@@ -63,6 +63,12 @@ def test_coulombs_friction_is_level_by_statics_where_eq1_falls(kinetic: float, n
     np.testing.assert_allclose(at_rest.mean(), math.tan(math.radians(6.0)), atol=0.005)
 
 
+def test_friction_above_the_static_one_is_doubted() -> None:
+    """As of a channel whose sign is reversed, or whose unit is another one."""
+    found = slipsweep.measured_friction(coulomb(0.38, 0.0), 6.0, 0.25)
+    assert "more than mu_s = 0.25: are signs and units of all channels" in found.attrs["constant_friction"]
+
+
 def test_a_decaying_interface_is_not_called_constant(stick_slip: xr.Dataset) -> None:
     assert friction(stick_slip).attrs["constant_friction"] == ""
     assert friction(measured(stick_slip)).attrs["constant_friction"] == ""
@@ -159,6 +165,7 @@ ROWS = "".join(f"{i / 100},{math.sin(i)},{math.sin(i)}\n" for i in range(20))
         (HEAD.replace(" (m/s2),", ","), r"'table acceleration': must give its unit in brackets"),
         (HEAD.replace("(m/s2),", "(mm),") + ROWS, r"must be a unit that converts to m s-2"),
         (HEAD + ROWS.replace("0.05,", "0.04,"), "time of sample 6 = 0.04: must be greater than 0.04"),
+        (HEAD + "\n".join([*ROWS.splitlines(), "9,0,0"]), "no samples from t = 0.19 to 9 s"),
         (HEAD + "0,1,one\n", "line 2: block_acceleration = 'one': must be a number"),
         (HEAD.replace(",block acceleration", ",temperature") + ROWS, "block_acceleration: missing: Eq. 1 needs"),
     ],

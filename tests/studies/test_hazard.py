@@ -232,7 +232,7 @@ def test_the_command(tmp_path: Path) -> None:
         for point in found.annual_rate.values
         for d, rate in zip([0.05, 0.2, 90], point, strict=True)
     ]
-    assert "up to 33.3% of the motions or samples have no value" in done.stdout
+    assert "up to 33.3% of the motions have no value" in done.stdout
     assert done.stdout.count("not exceeded at any amplitude") == 2
     assert "mu_s = 0.3\n" in done.stdout
     assert "above 1.019 g P(u > d) is taken as it is there: to compute it, extend the axis amplitude" in done.stdout

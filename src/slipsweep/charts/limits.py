@@ -137,9 +137,9 @@ def hazard(result: Result, options: Options) -> Figure:
         (drawing.legend[name],) = panel.plot(wanted[marks] * 1000.0, shown[marks], **handle)
     for axis, (low, high) in ((panel.xaxis, panel.get_xlim()), (panel.yaxis, panel.get_ylim())):
         log_ticks(axis, high / low)
-    if names == [""]:
+    if len(names) == 1:  # the caption has what the curve is of
         drawing.legend.clear()
-    texts = [style.model_text(rates.attrs), f"hazard curve: {style.plain(rates.attrs['hazard_curve'])}"]
+    texts = [style.caption(rates, options), f"hazard curve: {style.plain(rates.attrs['hazard_curve'])}"]
     if (held > 0.5 * lines).any():
         ends = [float(rates.attrs[f"{name}_range"][-1]) for name in ("amplitude", "hazard_curve")]
         what = "the largest amplitude of the sweep" if ends[0] < ends[1] else "the end of the hazard curve"

@@ -11,6 +11,7 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+import xarray as xr
 from matplotlib.colors import BoundaryNorm, Colormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -57,6 +58,9 @@ UNSOUND_HATCH = "///"
 #: Least width and height of a hatched region, inches: a smaller one is a scrap of hatch; the caption counts its cells.
 _SCRAP = 0.09
 
+#: Share of the steps from cell to cell in which values grow more than tenfold, beyond which a grid is coarse.
+_COARSE = 0.1
+
 #: What a contour's label takes to each side, and what it needs to the next line, inches.
 _LABEL_SPACE, _LINE_SPACE = 0.28, 0.11
 
@@ -78,6 +82,10 @@ def contours(result: Result, options: Options) -> Figure:
         return _finish(sheet, name)
     colours = style.COLOURS.resampled(len(levels) + 1)
     norm = BoundaryNorm(np.log10(levels), colours.N, extend="min" if np.nanmax(drawn) < levels[-1] else "both")
+    logs = xr.apply_ufunc(np.log10, drawn.clip(min=levels[0]))
+    growth = [logs.diff(dim) for dim in (sheet.x, str(sheet.y))]
+    if any((abs(one) > 1.0).sum() > _COARSE * (one != 0.0).sum() for one in growth):
+        sheet.notes.append("Coarse grid: values grow more than tenfold from cell to cell; read none between cells.")
     of_length = RESULTS[name].get("units") == "m"
     texts = [style.length_text(one) if of_length else style.with_unit(f"{one:.3g}", style.unit(name)) for one in levels]
     # what is below the lowest level, or nothing, is a hundredth of it; what does not slide is covered later

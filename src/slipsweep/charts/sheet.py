@@ -226,6 +226,10 @@ class Sheet(Drawing):
         if trends:
             share = solved.percent(int(self.data["unsound"].sum()) / int((drawn > 0).sum()))
             self.notes.append(f"{marked}: {share} of the sliding cells shown. {trends[0].upper()}{trends[1:]}.")
+        if "limit_line" in self.data and "validity" in self.data:
+            continuous = self.data["amplitude"] > self.data["limit_line"]
+            text = solved.estimated(self.data, drawn, continuous.reset_coords(drop=True))
+            self.notes += [f"{text}."] if text else []
 
     def done(self, beside: bool = True) -> Figure:
         """Draw legend and caption."""

@@ -14,6 +14,7 @@ from slipsweep.charts.style import SHOWN, Options, check_attributes
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.motions import read_embedded
 from slipsweep.files.selection import At, Place, axis_labels, between, find
+from slipsweep.model.parameters import friction_coefficient
 from slipsweep.model.variables import PARAMETERS, STATISTIC_COORDINATES, STATISTICS
 
 #: Dimensions whose places have names, and no order.
@@ -116,7 +117,7 @@ class Result:
         """Why no slice at another value of an axis can be solved; empty where it can."""
         if self.sort != "sweep":
             return "nothing is computed again for a chart of statistics, limits or recorded motions"
-        derived = {"amplitude"} if dim in ("displacement_amplitude", "frequency") else set()
+        derived = {"phi": {"mu_s"}, "displacement_amplitude": {"amplitude"}, "frequency": {"amplitude"}}.get(dim, set())
         others = [name for name in PARAMETERS if name in self.data.coords and name not in (dim, *derived)]
         tied = next((name for name in others if dim in self.data[name].dims), None)
         return f"{tied} is known at those values only" if tied else ""
@@ -150,6 +151,8 @@ class Result:
         data = self.data[there].isel(index, missing_dims="ignore").load().assign_coords(exact)
         if exact and "displacement_amplitude" in data.coords:
             data = data.drop_vars("amplitude", errors="ignore")
+        if "phi" in exact:
+            data = data.assign_coords(mu_s=data["phi"].pipe(friction_coefficient).assign_attrs(PARAMETERS["mu_s"]))
         data = with_amplitude(data)
         solved = [name for name in names if exact or name not in there]
         if solved and self.sort != "sweep" and self.motion is None:

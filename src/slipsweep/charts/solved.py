@@ -134,6 +134,16 @@ def unsound(data: xr.Dataset, drawn: xr.DataArray, theirs: xr.DataArray | None) 
     return cells.transpose(*drawn.dims), text
 
 
+def estimated(data: xr.Dataset, drawn: xr.DataArray, continuous: xr.DataArray) -> str:
+    """The share of the sliding cells that slide continuously with estimated friction, in words (docs/trust.md)."""
+    slides = drawn > 0
+    cells = slides & continuous & has_flags(data["validity"], Validity.FRICTION_ESTIMATED)
+    if not cells.any():
+        return ""
+    share = percent(int(cells.sum()) / int(slides.sum()))
+    return f"{share} of the sliding cells slide continuously with estimated friction: not for design"
+
+
 def percent(share: float) -> str:
     """A share in percent, in two digits or 100."""
     return f"{float(f'{100 * share:.2g}'):g} %"

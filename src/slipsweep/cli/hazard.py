@@ -45,7 +45,7 @@ def hazard(
     """
     import numpy as np
 
-    from slipsweep.files.opening import read_result
+    from slipsweep.files.opening import read_result, values_text
     from slipsweep.files.selection import own_names, selected
     from slipsweep.studies import suite_statistics
     from slipsweep.studies.hazard import displacement_hazard, fragility, openquake_fragility, read_hazard_curve
@@ -82,8 +82,9 @@ def hazard(
     echo(f"amplitudes of the result {low:.4g} to {high:.4g} g, hazard curve {start:.4g} to {end:.4g} g")
     # a share without a value may lie along fewer dimensions: it does not depend on the frequency
     sizes = {dim: size for dim, size in rates["annual_rate"].sizes.items() if dim != "threshold"}
+    fixed = [f"{name} = {values_text(rates[name])}" for name in typed if name in rates.coords and name not in sizes]
     for index, point in zip(np.ndindex(*sizes.values()), suite_statistics.point_names(rates, sizes), strict=True):
-        echo(*([point] if point else ()))
+        echo(*filter(None, [", ".join(filter(None, [point, *fixed]))]))
         _summarize_point(rates.isel(dict(zip(sizes, index, strict=True))), first, last)
     rate, held, omitted = (rates[name] for name in ("annual_rate", "held_rate", "omitted_rate"))
     axis = "the axis amplitude of the sweep" if high < end else "the hazard curve"
@@ -103,7 +104,9 @@ def _summarize_point(rates: "xr.Dataset", first: float, last: float) -> None:
     """The table of one grid point."""
     share = rates["valueless_share"].item()
     if share > 0.0:
-        echo(f"  up to {share:.1%} of the motions or samples have no value at an amplitude: left out of P")
+        what = "motions" if rates.attrs["suite_dimensions"].split()[-1] != "samples" else "samples"
+        unstable = "; those that are statically unstable count as exceeding" if what == "samples" else ""
+        echo(f"  up to {share:.1%} of the {what} have no value at an amplitude: left out of P{unstable}")
     if rates["annual_rate"].isnull().any():
         echo("  no annual rate: fewer than two amplitudes have a value")
         return

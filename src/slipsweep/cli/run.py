@@ -117,13 +117,16 @@ def run(
         echo(f"the same motion under several labels: {template.attrs['duplicate_motions']}")
     common.echo_tally(report.tally)
     result = opening.read_result(report.path)
-    echo(*filter(None, (_why_nothing_slides(template, report.tally), _unsound_text(result))))
+    echo(*filter(None, (_why_nothing_slides(template, report.tally), unsound_text(result))))
     common.echo_suite(result, most=20)
     echo(f"{report.path}  {size_text(storing.nbytes_of(report.path))}")
 
 
-def _unsound_text(table: "xr.Dataset") -> str:
-    """How many sliding cells have a trend that no block has; of many cells some, evenly spaced, are looked at."""
+def unsound_text(table: "xr.Dataset") -> str:
+    """How many sliding cells have a trend that no block has, and how many slide continuously with estimated friction.
+
+    Of many cells some, evenly spaced, are looked at.
+    """
     from slipsweep.charts import solved
 
     moved, drives = table.get(solved.DISPLACEMENT), {*variables.STRENGTHS, "displacement_amplitude"}
@@ -132,8 +135,11 @@ def _unsound_text(table: "xr.Dataset") -> str:
     each = math.ceil((moved.size / _LOOKED_AT) ** (1.0 / max(moved.ndim, 1)))
     some = table.thin(dict.fromkeys(moved.dims, each)).load()
     drawn = solved.reliable(some, solved.DISPLACEMENT)
-    _, text = solved.unsound(some.assign({solved.DISPLACEMENT: drawn}), drawn, solved.newmark(some))
-    return text and f"unsound: {text}"
+    _, trends = solved.unsound(some.assign({solved.DISPLACEMENT: drawn}), drawn, solved.newmark(some))
+    estimated = ""
+    if {"sliding_mode", "validity"} <= {*some}:
+        estimated = solved.estimated(some, drawn, some["sliding_mode"] == SlidingMode.CONTINUOUS)
+    return "\n".join(f"unsound: {text}" for text in (trends, estimated) if text)
 
 
 def _why_nothing_slides(table: "xr.Dataset", tally: "Tally") -> str:

@@ -105,4 +105,7 @@ def simulate(
     for kind in variables.FlagKind:
         flags = validity & variables.flags_of(kind)
         echo(*(f"{kind:<24}{(flag.name or '').lower()}: {flag.text}" for flag in flags))
+    continuous = table.get("sliding_mode", 0) == variables.SlidingMode.CONTINUOUS
+    if continuous and validity & variables.Validity.FRICTION_ESTIMATED:
+        echo("not for design          continuous sliding with estimated friction")
     echo(f"taken as                {taken_as}", *paths)

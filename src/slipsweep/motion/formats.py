@@ -78,6 +78,9 @@ def _csv(lines: list[str], reading: Reading) -> Samples:
     header, body = _header(lines)
     if not body:
         raise InputError("no line of a time and an acceleration")
+    unit = re.search(r"\bt(?:ime)?\s*[(\[]\s*([a-z]+)", header, re.IGNORECASE)
+    if unit and unit[1].lower() not in ("s", "sec", "seconds"):
+        raise InputError(f"time in {unit[1]}: must be in s")
 
     def two(line: str) -> list[str]:
         time, value = _cells(line)

@@ -16,6 +16,7 @@ from slipsweep.model.parameters import check_choice, check_finite, check_list, c
 from slipsweep.model.units import conversion
 from slipsweep.model.variables import HISTORY
 from slipsweep.motion.formats import read_columns, read_lines
+from slipsweep.motion.inspection import without_fill_values
 from slipsweep.motion.intensity import Floats
 from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS
 from slipsweep.motion.records import check_samples
@@ -128,6 +129,8 @@ def read_test(path: str | Path) -> ShakingTest:
     content, lines = read_lines(path)
     example = "time (s), table acceleration (m/s2), block acceleration (m/s2)"
     values = read_columns(path, lines, channel_of, ("time", TABLE), example)
+    if missing := without_fill_values(values["time"], values[TABLE])[2]:
+        raise InputError(f"{path}: {TABLE}: {missing}: samples are missing; take the part of the test that has all")
     name = path.name.encode(errors="backslashreplace").decode()
     attrs = {"test": name, "test_sha256": hashlib.sha256(content).hexdigest()}
     return ShakingTest(values.pop("time"), values, str(path), attrs)

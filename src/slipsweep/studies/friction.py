@@ -42,6 +42,9 @@ _AT_ENDS, _FIRST = 3, 6
 #: samples lies below that part of the static coefficient.
 _LEVEL, _LOW_SHARE, _LOW = 0.05, 0.05, 0.8
 
+#: Constant friction of so many times the static coefficient given is that of a channel in a wrong unit, or reversed.
+_TOO_MUCH = 1.25
+
 #: Attributes by which results are known as ours.
 SOURCE = {"source": f"slipsweep {__version__}", "references": REFERENCE}
 
@@ -157,6 +160,11 @@ def coefficients_of(
         f"This is a block of constant friction: by statics {kinetic[1]:.3g} while it slides, though Eq. 1 falls. "
         "Newmark's model is the right one for it."
     )
+    if max(static[1], kinetic[1]) > _TOO_MUCH * mu_s:
+        sentence = (
+            f"By statics friction is {static[1]:.3g} where a slide begins and {kinetic[1]:.3g} in it, more than "
+            f"mu_s = {mu_s:.3g}: are signs and units of all channels, theta and mu_s right?"
+        )
     return xr.Dataset(found, attrs={"constant_friction": sentence if constant else ""})
 
 
