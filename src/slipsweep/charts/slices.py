@@ -14,7 +14,6 @@ from slipsweep.charts.style import SHOWN, Options, check_attributes
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.motions import read_embedded
 from slipsweep.files.selection import At, Place, axis_labels, between, find
-from slipsweep.model.parameters import friction_coefficient
 from slipsweep.model.variables import PARAMETERS, STATISTIC_COORDINATES, STATISTICS
 
 #: Dimensions whose places have names, and no order.
@@ -152,7 +151,8 @@ class Result:
         if exact and "displacement_amplitude" in data.coords:
             data = data.drop_vars("amplitude", errors="ignore")
         if "phi" in exact:
-            data = data.assign_coords(mu_s=data["phi"].pipe(friction_coefficient).assign_attrs(PARAMETERS["mu_s"]))
+            tangent = np.tan(np.radians(data["phi"].values))
+            data = data.assign_coords(mu_s=(data["phi"].dims, tangent, PARAMETERS["mu_s"]))
         data = with_amplitude(data)
         solved = [name for name in names if exact or name not in there]
         if solved and self.sort != "sweep" and self.motion is None:
