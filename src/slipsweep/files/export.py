@@ -38,9 +38,6 @@ MOST_ROWS, MOST_COLUMNS = 1_048_576, 16_384
 #: Beginnings of texts that a spreadsheet takes for formulas when it opens a CSV file.
 _FORMULAS = ("=", "+", "-", "@", "\t", "\r")
 
-#: Given how many rows there are, yields what to call with a number of rows just written.
-Progress = Callable[[int], AbstractContextManager[Callable[[int], None] | None]]
-
 
 def export(
     source: str | Path,
@@ -53,16 +50,17 @@ def export(
     rows: Sequence[str] = (),
     columns: str | None = None,
     overwrite: bool = False,
-    progress: Progress | None = None,
+    progress: Callable[[int], AbstractContextManager[Callable[[int], None] | None]] | None = None,
 ) -> int:
     """Write a result of slipsweep as a table, complete or not at all; return the number of rows, of all sheets.
 
     The ending of `path` is one of `SUFFIXES`.  Results are `variables`, by default all; dimensions that none of them
     has are left out.  Sliding modes and flags are codes or `words`, accelerations in m/s² or `in_g`, that of the model.
     `at` says which values to keep of an axis, as `slipsweep.files.selection.places_at`.  With `columns`, the axis along
-    the columns of a pivoted table, `rows` are those along its rows.  InputError: `source` is not slipsweep's, `path`
-    cannot be written, a variable, axis or value is not in the file, a spreadsheet cannot hold the table, or the package
-    is missing that writes it.
+    the columns of a pivoted table, `rows` are those along its rows.  `progress` is given how many rows there are, and
+    yields what to call with a number of rows just written.  InputError: `source` is not slipsweep's, `path` cannot be
+    written, a variable, axis or value is not in the file, a spreadsheet cannot hold the table, or the package is
+    missing that writes it.
     """
     _check_format(path)
     check_outputs([path], overwrite, reads=[Path(source)])
@@ -151,12 +149,9 @@ class Table:
     @cached_property
     def left(self) -> list[str]:
         """Coordinates along the rows; of a long table also those of one value."""
-        along = {
-            str(name)
-            for name, one in self.part.coords.items()
-            if {*one.dims} <= {*self.rows} and (one.dims or not self.columns) and name not in MOTION_FILES
-        }
-        return [name for name in dict.fromkeys((*PARAMETERS, *map(str, self.part.coords))) if name in along]
+        coords = self.part.drop_vars(MOTION_FILES, errors="ignore").coords
+        names = [name for name in dict.fromkeys((*PARAMETERS, *map(str, coords))) if name in coords]
+        return [one for one in names if {*coords[one].dims} <= {*self.rows} and (coords[one].dims or not self.columns)]
 
     def check_size(self, source: object) -> None:
         """Refuse what a sheet cannot hold, and say what to cut."""

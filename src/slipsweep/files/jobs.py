@@ -60,8 +60,8 @@ class Job:
         """Results with all that the file says, in the file's types."""
         found = table.assign({name: table[name].astype(dtype, copy=False) for name, dtype in self.dtypes.items()})
         if self.labels:
-            about = {"long_name": "name of the case"}
-            found = found.assign_coords(label=("case", np.array(self.labels, object), about))
+            labels = xr.Variable("case", np.array(self.labels, object), {"long_name": "name of the case"})
+            found = found.assign_coords(label=labels)
         found = described(found, title=self.title, command=command, recorded=self.spec.recorded)
         return found.assign_attrs(self.attrs, **{RUN: self.digest})
 

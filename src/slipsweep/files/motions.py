@@ -44,10 +44,8 @@ def embedded(motion: Record | Suite) -> dict[str, xr.Variable]:
     """The variables that hold a record or a suite."""
     records = motion.components if isinstance(motion, Suite) else (motion,)
     samples = np.concatenate([(one.times, one.acceleration) for one in records], axis=1)
-    found = {
-        name: xr.Variable((RECORD_DIM,), values, about)
-        for (name, about), values in zip(RECORD_SAMPLES.items(), samples, strict=True)
-    }
+    described = zip(RECORD_SAMPLES.items(), samples, strict=True)
+    found = {name: xr.Variable((RECORD_DIM,), values, about) for (name, about), values in described}
     if isinstance(motion, Record):
         return found
     each = 2 if motion.has_pairs else 1
@@ -72,9 +70,7 @@ def read_embedded(file: xr.Dataset, path: Path) -> Record | Suite | None:
     about = {key: str(text) for key, text in file.attrs.items() if key == "baseline" or key.startswith("record")}
     name = about.get("record", str(path))
     try:
-        if _COUNT not in file:
-            return Record(times, acceleration, name, about)
-        return _suite(file, times, acceleration)
+        return _suite(file, times, acceleration) if _COUNT in file else Record(times, acceleration, name, about)
     except InputError as error:
         raise InputError(f"{path}: {str(error).removeprefix(f'{name}: ')}") from None
 

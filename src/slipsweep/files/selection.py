@@ -117,8 +117,7 @@ def places_at(
 
 def selected(data: xr.Dataset, source: object, at: Mapping[str, At], kept: Collection[str]) -> xr.Dataset:
     """A result at values of its axes, but for those that are `kept` whole; as `places_at`."""
-    dims = [str(dim) for dim in data.sizes if dim not in kept]
-    return data.isel(places_at(data, source, at, dims), missing_dims="ignore")
+    return data.isel(places_at(data, source, at, [str(dim) for dim in data.sizes if dim not in kept]))
 
 
 def between(data: xr.Dataset, name: str, value: float) -> str:
