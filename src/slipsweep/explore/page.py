@@ -56,9 +56,7 @@ def cell_arrays(excerpt: Excerpt) -> dict[str, Array]:
     for name in filter(excerpt.table.__contains__, SHOWN):
         variable = excerpt.table[name]
         values = variable.values.reshape([variable.sizes.get(dim, 1) for dim in excerpt.sizes])
-        law = None
-        if scale_of(name) == "displacement":
-            values, law = _by_law(excerpt, values)
+        values, law = _by_law(excerpt, values) if scale_of(name) == "displacement" else (values, None)
         arrays[name] = packed(values, dims=variable.dims, law=law)
     for key, coord in excerpt.table.coords.items():
         if key not in coord.dims:
@@ -109,7 +107,8 @@ def write_page(path: Path, output: Path, *, size: int = PAGE_BYTES, overwrite: b
     if histories is not None:
         arrays["histories"] = packed(histories.values.astype("<i2"))
         arrays["history_scale"] = packed(histories.scale.astype("<f4"))
-    name, attrs = path.name.encode(errors="backslashreplace").decode(), excerpt.table.attrs  # no UTF-8, perhaps
+    name = path.name.encode(errors="backslashreplace").decode()  # it may have bytes that are no UTF-8
+    attrs = excerpt.table.attrs
     files = PackageLoader("slipsweep", "explore")
     environment = Environment(loader=files, autoescape=True)
     environment.policies["json.dumps_kwargs"] = {"sort_keys": False, "allow_nan": False}  # Bokeh's have an order
