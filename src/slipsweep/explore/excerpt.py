@@ -47,8 +47,6 @@ _COLUMNS = ("block_acceleration", "relative_velocity", "relative_displacement")
 
 _VERTICAL = ("amplitude", "displacement_amplitude", *STRENGTHS[1:])
 
-Indices = dict[str, NDArray[np.intp]]
-
 
 def thinned_lengths(
     lengths: Mapping[str, int], cells: int, map_dims: Sequence[str] = (), whole: Collection[str] = ()
@@ -95,27 +93,18 @@ class Excerpt:
         """The results that the map can show."""
         return [name for name in LAYERS if name in self.table]
 
-    def values(self, dim: str) -> NDArray[np.float64]:
-        """The values along a dimension; one without a coordinate, such as `case`, counts from 1."""
-        return axis_numbers(self.table, dim)
-
     def is_log(self, dim: str) -> bool:
         """Whether an axis is drawn by factors: the frequency, and others that are spread so."""
-        values = self.values(dim)
+        values = axis_numbers(self.table, dim)
         if values.size < 2 or values[0] <= 0.0 or dim in self.labels:
             return False
         return dim == "frequency" or is_log(values)
 
 
 def read_excerpt(path: Path, cells: int) -> Excerpt:
-    """Read a result, or an evenly spaced part of it that has at most `cells` cells.
+    """Read a result, or an evenly spaced part of it that has at most `cells` cells, in chunks.
 
-    The file is read in chunks, of which only what is kept stays in memory.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, or holds no displacement over two parameters.
+    InputError: the file cannot be read, or holds no displacement over two parameters.
     """
     result = Result(open_result(path), path).data  # checked, in increasing order
     result = result.sortby([dim for dim in ("polarity",) if dim in result.dims])
@@ -148,13 +137,12 @@ def read_excerpt(path: Path, cells: int) -> Excerpt:
 def _with_statistics(table: xr.Dataset) -> xr.Dataset:
     """Add the statistics over the motions of a suite."""
     found = suite_statistics(table)
-    names = [name for name in SHOWN if name in found.data_vars]
-    for name in names:
+    table = table.assign_coords({dim: found[dim].variable for dim in ("quantile", "threshold")})
+    for name in [one for one in SHOWN if one in found.data_vars]:
         text = str(found[name].attrs["long_name"])
         text = text if "motions" in text else f"{text}, over all motions"
-        found[name] = found[name].astype(SHOWN[name]).assign_attrs(long_name=text)
-    added = {name: found[name].variable for name in names}
-    return table.assign(added).assign_coords({dim: found[dim].variable for dim in ("quantile", "threshold")})
+        table[name] = found[name].astype(SHOWN[name]).assign_attrs(long_name=text).variable
+    return table
 
 
 def _map_dims(path: Path, lengths: Mapping[str, int]) -> tuple[str, str]:
@@ -196,7 +184,7 @@ class Histories:
     (..., quantity), which is NaN where a cell has no history.
     """
 
-    keep: Indices
+    keep: dict[str, NDArray[np.intp]]
     phase: NDArray[np.float64]
     ground: NDArray[np.float64]
     values: NDArray[np.int16]
@@ -207,14 +195,9 @@ class Histories:
 def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
     """Compute the histories of as many cells, evenly spaced, as fit into `most_bytes`.
 
-    They depend on time through the phase only: v(f) = V/ω and u(f) = W/ω², so that one
-    history serves all frequencies and the page scales it (MODEL, motion rules).
-
-    Returns
-    -------
-    Histories or None
-        None where the shaking is not periodic or ends with a ramp beyond the cycles shown, where inputs are
-        uncertain, or where not even one history fits.
+    They depend on time through the phase only: v(f) = V/ω and u(f) = W/ω², so that one history serves all frequencies
+    and the page scales it (MODEL, motion rules).  None where the shaking is not periodic or ends with a ramp beyond the
+    cycles shown, where inputs are uncertain, or where not even one history fits.
     """
     table = excerpt.table
     if "waveform" not in table.attrs or "permanent_displacement" not in table:

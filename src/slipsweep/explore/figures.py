@@ -9,9 +9,6 @@ from slipsweep.charts.style import BLUE, SYMBOLS, VERMILION, Options, axis_label
 from slipsweep.explore.excerpt import Excerpt
 from slipsweep.model.variables import PARAMETERS, RESULTS, STATISTIC_COORDINATES, STATISTICS
 
-#: Height of the map, px; its width is that of the window.
-MAP_HEIGHT = 520
-
 
 def about(name: str) -> dict[str, Any]:
     """What is known of a result or a dimension: its long name and unit."""
@@ -57,7 +54,7 @@ def _map(excerpt: Excerpt) -> Any:
     up, across = excerpt.map_dims
     chart: Any = figure(  # its properties take more than their annotations say
         name="map",
-        height=MAP_HEIGHT,
+        height=520,  # px; its width is that of the window
         sizing_mode="stretch_width",
         x_axis_type="log" if excerpt.is_log(across) else "linear",
         y_axis_type="log" if excerpt.is_log(up) else "linear",

@@ -10,7 +10,6 @@ of JSON.  The page's policy runs two scripts, known by their digests: Bokeh's li
 
 import base64
 import hashlib
-import importlib.resources
 import math
 import zlib
 from collections.abc import Mapping
@@ -25,6 +24,7 @@ from slipsweep.errors import InputError
 from slipsweep.explore.excerpt import LAYERS, POINTS, SHOWN, Excerpt, Histories, compute_histories, read_excerpt
 from slipsweep.explore.figures import decades, figures, label, scale_of
 from slipsweep.files import outputs
+from slipsweep.files.selection import axis_numbers
 from slipsweep.grid.resources import size_text
 from slipsweep.model import variables as known
 
@@ -56,9 +56,7 @@ def cell_arrays(excerpt: Excerpt) -> dict[str, Array]:
     for name in filter(excerpt.table.__contains__, SHOWN):
         variable = excerpt.table[name]
         values = variable.values.reshape([variable.sizes.get(dim, 1) for dim in excerpt.sizes])
-        law = None
-        if scale_of(name) == "displacement":
-            values, law = _by_law(excerpt, values)
+        values, law = _by_law(excerpt, values) if scale_of(name) == "displacement" else (values, None)
         arrays[name] = packed(values, dims=variable.dims, law=law)
     for key, coord in excerpt.table.coords.items():
         if key not in coord.dims:
@@ -72,7 +70,7 @@ def _by_law(excerpt: Excerpt, values: NDArray[Any]) -> tuple[NDArray[Any], dict[
         if dim in _LAWS and values.shape[axis] > 1:
             shape = [-1 if other == dim else 1 for other in excerpt.sizes]
             with np.errstate(over="ignore", invalid="ignore", under="ignore"):
-                factor = (excerpt.values(dim) ** _LAWS[dim]).reshape(shape)
+                factor = (axis_numbers(excerpt.table, dim) ** _LAWS[dim]).reshape(shape)
                 first = (values.take([0], axis) / factor.take([0], axis)).astype(values.dtype)
                 if np.allclose(first * factor, values, rtol=4e-7, atol=0.0, equal_nan=True):
                     return first, {"dim": dim, "power": _LAWS[dim]}
@@ -82,16 +80,15 @@ def _by_law(excerpt: Excerpt, values: NDArray[Any]) -> tuple[NDArray[Any], dict[
 def write_page(path: Path, output: Path, *, size: int = PAGE_BYTES, overwrite: bool = False) -> Excerpt:
     """Write the page of a result, of at most `size` bytes, complete or not at all; return what it shows.
 
-    Raises
-    ------
-    InputError
-        The file cannot be read or drawn, `size` is too small, Bokeh is not installed, or the output exists.
-    RunError
-        Writing failed.
+    InputError: the file cannot be read or drawn, `size` is too small, Bokeh is not installed, or the output exists.
+    RunError: writing failed.
     """
+    from jinja2 import Environment, PackageLoader
+    from markupsafe import Markup
+
     outputs.check_outputs([output], overwrite, reads=[path])
-    script = _bokeh_script()
-    overhead = len(script.encode()) + 150_000  # figures and notes
+    bokeh = _bokeh_script()
+    overhead = len(bokeh.encode()) + 150_000  # figures and notes
     least = overhead + 50_000
     if size < least:
         raise InputError(f"--size = {size_text(size)}: must be {size_text(least)} at least, most of it Bokeh's library")
@@ -107,28 +104,16 @@ def write_page(path: Path, output: Path, *, size: int = PAGE_BYTES, overwrite: b
         cells = int(math.prod(excerpt.sizes.values()) * 0.95 * _CELLS_SHARE * left / taken)
     # base64 makes four bytes of three
     histories = compute_histories(excerpt, min(left - taken, _HISTORIES_BYTES) * 3 // 4)
-    name = path.name.encode(errors="backslashreplace").decode()  # it may have bytes that are no UTF-8
-    text = page(excerpt, arrays, histories, name, script)
-    with outputs.complete_or_absent(output, overwrite) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    return excerpt
-
-
-def page(excerpt: Excerpt, arrays: dict[str, Array], histories: Histories | None, name: str, bokeh: str) -> str:
-    """Return the page's HTML; `name` is that of the file, `bokeh` Bokeh's library."""
-    from jinja2 import Environment
-    from markupsafe import Markup
-
-    attrs = excerpt.table.attrs
     if histories is not None:
         arrays["histories"] = packed(histories.values.astype("<i2"))
         arrays["history_scale"] = packed(histories.scale.astype("<f4"))
-    files = importlib.resources.files("slipsweep.explore")
-    script = (files / "page.js").read_text(encoding="utf-8")
-    environment = Environment(autoescape=True)
+    name = path.name.encode(errors="backslashreplace").decode()  # it may have bytes that are no UTF-8
+    attrs = excerpt.table.attrs
+    files = PackageLoader("slipsweep", "explore")
+    environment = Environment(loader=files, autoescape=True)
     environment.policies["json.dumps_kwargs"] = {"sort_keys": False, "allow_nan": False}  # Bokeh's have an order
-    template = environment.from_string((files / "page.html").read_text(encoding="utf-8"))
-    return template.render(
+    script = files.get_source(environment, "page.js")[0]
+    text = environment.get_template("page.html").render(
         title=attrs.get("title", name),
         file=name,
         caption=caption(excerpt.table).split("\n"),
@@ -140,6 +125,9 @@ def page(excerpt: Excerpt, arrays: dict[str, Array], histories: Histories | None
         script=Markup(script),
         allowed=Markup(" ".join(map(_digest, (bokeh, script)))),
     )
+    with outputs.complete_or_absent(output, overwrite) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return excerpt
 
 
 def _digest(script: str) -> str:
@@ -162,7 +150,7 @@ def _contents(excerpt: Excerpt, arrays: Mapping[str, Array], histories: Historie
     return {
         "dims": [
             _dimension(dim)
-            | {"values": excerpt.values(dim).tolist(), "log": excerpt.is_log(dim)}
+            | {"values": axis_numbers(excerpt.table, dim).tolist(), "log": excerpt.is_log(dim)}
             | {"labels": excerpt.labels.get(dim, [])}
             for dim in excerpt.sizes
         ],
@@ -212,7 +200,7 @@ def _thinned(excerpt: Excerpt) -> list[tuple[str, str]]:
     found = []
     for dim, length in excerpt.lengths.items():
         if excerpt.sizes[dim] < length:
-            values = ", ".join(f"{value:.5g}" for value in excerpt.values(dim))
+            values = ", ".join(f"{value:.5g}" for value in axis_numbers(excerpt.table, dim))
             units = f" {unit(dim)}" if dim in known.PARAMETERS else ""
             found.append((f"{dim}: {excerpt.sizes[dim]} of {length} values", values + units))
     return found

@@ -29,17 +29,14 @@ if TYPE_CHECKING:
 #: Cells read at a time; text of ten columns takes a hundred times as many bytes.
 CHUNK_CELLS = 2**18
 
-#: Endings of tables, and for those that need one the module and the extra that brings it.
-SUFFIXES = {".csv": None, ".parquet": ("pyarrow.parquet", "parquet"), ".xlsx": ("xlsxwriter", "xlsx")}
+#: Endings of tables, the module that writes each, and the extra that brings it.
+SUFFIXES = {".csv": ("csv", ""), ".parquet": ("pyarrow.parquet", "parquet"), ".xlsx": ("xlsxwriter", "xlsx")}
 
 #: What a sheet of a spreadsheet can hold, the header included.
 MOST_ROWS, MOST_COLUMNS = 1_048_576, 16_384
 
 #: Beginnings of texts that a spreadsheet takes for formulas when it opens a CSV file.
 _FORMULAS = ("=", "+", "-", "@", "\t", "\r")
-
-#: Given how many rows there are, yields what to call with a number of rows just written.
-Progress = Callable[[int], AbstractContextManager[Callable[[int], None] | None]]
 
 
 def export(
@@ -53,29 +50,30 @@ def export(
     rows: Sequence[str] = (),
     columns: str | None = None,
     overwrite: bool = False,
-    progress: Progress | None = None,
+    progress: Callable[[int], AbstractContextManager[Callable[[int], None] | None]] | None = None,
 ) -> int:
     """Write a result of slipsweep as a table, complete or not at all; return the number of rows, of all sheets.
 
     The ending of `path` is one of `SUFFIXES`.  Results are `variables`, by default all; dimensions that none of them
     has are left out.  Sliding modes and flags are codes or `words`, accelerations in m/s² or `in_g`, that of the model.
     `at` says which values to keep of an axis, as `slipsweep.files.selection.places_at`.  With `columns`, the axis along
-    the columns of a pivoted table, `rows` are those along its rows.  InputError: `source` is not slipsweep's, `path`
-    cannot be written, a variable, axis or value is not in the file, a spreadsheet cannot hold the table, or the package
-    is missing that writes it.
+    the columns of a pivoted table, `rows` are those along its rows.  `progress` is given how many rows there are, and
+    yields what to call with a number of rows just written.  InputError: `source` is not slipsweep's, `path` cannot be
+    written, a variable, axis or value is not in the file, a spreadsheet cannot hold the table, or the package is
+    missing that writes it.
     """
     _check_format(path)
     check_outputs([path], overwrite, reads=[Path(source)])
     with read_result(source) as opened:
         whole = _in_g(opened) if in_g else opened
-        known = [str(name) for name in whole.data_vars]
         chosen = list(dict.fromkeys(result_names(whole) if variables is None else variables))
         for name in chosen:
-            if name not in known:
-                raise InputError(f'{source}: no variable "{name}"; {did_you_mean(name, known)}')
-        widest = max((whole[name].dims for name in chosen), key=len)
-        dims = list(dict.fromkeys(str(dim) for name in chosen for dim in (*widest, *whole[name].dims)))
-        part = whole[chosen].isel(places_at(whole, source, at or {}, dims))
+            if name not in whole.data_vars:
+                raise InputError(f'{source}: no variable "{name}"; {did_you_mean(name, [*map(str, whole.data_vars)])}')
+        part = whole[chosen]
+        widest = max((one.dims for one in part.data_vars.values()), key=len)
+        dims = list(dict.fromkeys(map(str, (*widest, *part.sizes))))
+        part = part.isel(places_at(whole, source, at or {}, dims))
         if columns is None:
             if rows:
                 raise InputError(f"--rows {','.join(rows)}: needs --columns, the axis whose values become columns")
@@ -111,7 +109,7 @@ def export(
 
 def _check_format(path: Path) -> None:
     check_endings([path], SUFFIXES)
-    module, extra = SUFFIXES[path.suffix] or ("csv", "")
+    module, extra = SUFFIXES[path.suffix]
     try:
         importlib.import_module(module)
     except ImportError:
@@ -137,16 +135,11 @@ def _in_g(table: xr.Dataset) -> xr.Dataset:
 class Table:
     """A table: results with one row a cell, or one result pivoted."""
 
-    part: xr.Dataset  # the results, cut to what is exported
+    part: xr.Dataset  # the results, cut to what is exported; of a pivoted table one
     name: str
     words: bool  # instead of codes
     rows: list[str]  # dimensions along the rows
     columns: str | None = None  # the dimension along the columns of a pivoted table
-
-    @property
-    def results(self) -> list[str]:
-        """The results; of a pivoted table one."""
-        return [str(name) for name in self.part.data_vars]
 
     @property
     def count(self) -> int:
@@ -156,16 +149,13 @@ class Table:
     @cached_property
     def left(self) -> list[str]:
         """Coordinates along the rows; of a long table also those of one value."""
-        along = {
-            str(name)
-            for name, one in self.part.coords.items()
-            if {*one.dims} <= {*self.rows} and (one.dims or not self.columns) and name not in MOTION_FILES
-        }
-        return [name for name in dict.fromkeys((*PARAMETERS, *map(str, self.part.coords))) if name in along]
+        coords = self.part.drop_vars(MOTION_FILES, errors="ignore").coords
+        names = [name for name in dict.fromkeys((*PARAMETERS, *map(str, coords))) if name in coords]
+        return [one for one in names if {*coords[one].dims} <= {*self.rows} and (coords[one].dims or not self.columns)]
 
     def check_size(self, source: object) -> None:
         """Refuse what a sheet cannot hold, and say what to cut."""
-        width = len(self.left) + (self.part.sizes[self.columns] if self.columns else len(self.results))
+        width = len(self.left) + (self.part.sizes[self.columns] if self.columns else len(self.part.data_vars))
         if width > MOST_COLUMNS or self.count >= MOST_ROWS:
             sizes = " x ".join(f"{self.part.sizes[dim]} {dim}" for dim in self.rows)
             raise InputError(
@@ -182,27 +172,25 @@ class Table:
             part = self.part.isel(chunk).load()
             shape = {dim: part.sizes[dim] for dim in self.rows}
             found = {header(part[name]): part[name].variable.set_dims(shape).values.ravel() for name in self.left}
-            if self.columns is None:
-                shown: dict[Any, xr.DataArray] = {header(part[name]): part[name] for name in self.results}
-            else:
+            shown: dict[Any, xr.DataArray] = {header(one): one for one in part.data_vars.values()}
+            if self.columns is not None:
+                ((result, one),) = shown.items()
                 last = header(part[self.left[-1]]) if self.left else ""
-                found[f"{last} \\ {self._corner}"] = found.pop(last, np.arange(1, 1 + math.prod(shape.values())))
-                one, values = part[self.results[0]], axis_values(self.part, self.columns)
+                corner = f"{last} \\ {self._across(self.columns, result)}"
+                found[corner] = found.pop(last, np.arange(1, 1 + math.prod(shape.values())))
+                values = axis_values(part, self.columns)
                 shown = {value: one.isel({self.columns: place}) for place, value in enumerate(values)}
             for title, one in shown.items():
                 found[title] = self._column(one, one.variable.set_dims(shape).values.ravel())
             yield pd.DataFrame(found)
 
-    @property
-    def _corner(self) -> str:
-        """What a pivoted table is of, and what it has one value of."""
-        assert self.columns is not None
-        one = [
-            name for name, one in self.part.coords.items() if one.size == 1 and name not in (*self.rows, self.columns)
-        ]
-        texts = ", ".join(f"{name} = {values_text(self.part[name])}" for name in one)
-        across = header(self.part[self.columns]) if self.columns in self.part.coords else self.columns
-        return f"{across}: {header(self.part[self.results[0]])}" + (f" at {texts}" if texts else "")
+    def _across(self, columns: str, result: str) -> str:
+        """What the columns of a pivoted table are, what it is of, and what it has one value of."""
+        coords = self.part.coords
+        single = [name for name, one in coords.items() if one.size == 1 and name not in (*self.rows, columns)]
+        at = ", ".join(f"{name} = {values_text(coords[name])}" for name in single)
+        across = header(coords[columns]) if columns in coords else columns
+        return f"{across}: {result}" + (f" at {at}" if at else "")
 
     def _column(self, one: xr.DataArray, values: Any) -> Any:
         """Values of a result as a table has them: codes that stand for no value missing, or in words."""
@@ -210,8 +198,8 @@ class Table:
 
         if values.dtype.kind not in "iu":
             return values
-        missing = (values == -1) if one.name in WITH_MISSING else np.zeros(values.shape, bool)
-        about = {**RESULTS.get(str(one.name), LIMIT_RESULTS.get(str(one.name), {})), **one.attrs}
+        missing = (values == -1) & (one.name in WITH_MISSING)
+        about = (LIMIT_RESULTS | RESULTS).get(str(one.name), {}) | one.attrs
         if self.words and "flag_meanings" in about:
             return pd.Series(values, dtype=object).map(_spelled(about, np.unique(values))).mask(missing)
         return pd.Series(values, dtype=values.dtype.name.capitalize()).mask(missing) if missing.any() else values
@@ -224,12 +212,11 @@ def header(one: xr.DataArray) -> str:
 
 def _spelled(about: Mapping[str, Any], codes: Any) -> dict[Any, str]:
     """Codes in the words of a variable's attributes; flags one after the other."""
-    words = str(about["flag_meanings"]).split()
+    known = np.atleast_1d(about.get("flag_masks", about.get("flag_values", ()))).astype(int).tolist()
+    words = list(zip(known, str(about["flag_meanings"]).split(), strict=False))
     if "flag_masks" in about:
-        masks = np.atleast_1d(about["flag_masks"]).astype(int).tolist()
-        return {code: " ".join(w for w, mask in zip(words, masks, strict=False) if code & mask) for code in codes}
-    known = dict(zip(np.atleast_1d(about.get("flag_values", ())).astype(int).tolist(), words, strict=False))
-    return {code: known.get(int(code), str(code)) for code in codes}
+        return {code: " ".join(word for mask, word in words if code & mask) for code in codes}
+    return {code: dict(words).get(int(code), str(code)) for code in codes}
 
 
 def _pivot_rows(part: xr.Dataset, source: object, dims: Sequence[str], rows: Sequence[str], columns: str) -> list[str]:
@@ -269,7 +256,7 @@ def _write_parquet(path: Path, tables: list[Table], source: object, done: Callab
 
     (table,) = tables
     first = pyarrow.Table.from_pandas(next(table.frames(1)).rename(columns=str), preserve_index=False).schema
-    about = {header(table.part[name]): table.part[name].attrs for name in (*table.left, *table.results)}
+    about = {header(table.part[name]): table.part[name].attrs for name in (*table.left, *table.part.data_vars)}
     fields = [
         field.with_metadata({key: str(value) for key, value in about.get(field.name, {}).items()}) for field in first
     ]

@@ -58,14 +58,12 @@ class Job:
 
     def described(self, table: xr.Dataset, command: str) -> xr.Dataset:
         """Results with all that the file says, in the file's types."""
-        return described(
-            table.assign({name: table[name].astype(dtype, copy=False) for name, dtype in self.dtypes.items()}),
-            title=self.title,
-            command=command,
-            labels=self.labels,
-            recorded=self.spec.recorded,
-            attrs={**self.attrs, RUN: self.digest},
-        )
+        found = table.assign({name: table[name].astype(dtype, copy=False) for name, dtype in self.dtypes.items()})
+        if self.labels:
+            labels = xr.Variable("case", np.array(self.labels, object), {"long_name": "name of the case"})
+            found = found.assign_coords(label=labels)
+        found = described(found, title=self.title, command=command, recorded=self.spec.recorded)
+        return found.assign_attrs(self.attrs, **{RUN: self.digest})
 
     def outline(self, command: str) -> xr.Dataset:
         """As `described`, but with lazy arrays where the results will stand."""

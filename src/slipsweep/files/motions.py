@@ -23,33 +23,29 @@ RECORD_DIM, SUITE_DIM = "record_sample", "record"
 #: What is written of each record of a suite, beside how it was read.
 _LABEL, _COUNT, _COMPONENT = "record_label", "record_count", "record_component"
 
-#: How a record was read: a name in its attributes, that of the variable, and what that is.
-_READING = {
-    "record": ("record_file", "file of a record"),
-    "record_format": ("record_format", "format of the file of a record"),
-    "record_units": ("record_units", "unit of the file of a record"),
-    "record_channel": ("record_channel", "channel of the file of a record"),
-    "record_sha256": ("record_sha256", "SHA-256 of the file of a record"),
-    "record_accepted": ("record_accepted", "what is missing or implausible in a record, and was accepted"),
-    "baseline": ("record_baseline", "what was taken off a record"),
-}
-
 _ABOUT: dict[str, dict[str, Any]] = {
     _LABEL: {"long_name": "label of the motion of a record"},
     _COUNT: {"units": "1", "long_name": f"number of samples of a record, which follow one another along {RECORD_DIM}"},
     _COMPONENT: {"units": "1", "long_name": "horizontal component of the motion, 1 at azimuth 0 and 2 at 90 degrees"},
-    **{name: {"long_name": about} for name, about in _READING.values()},
+    "record_file": {"long_name": "file of a record"},
+    "record_format": {"long_name": "format of the file of a record"},
+    "record_units": {"long_name": "unit of the file of a record"},
+    "record_channel": {"long_name": "channel of the file of a record"},
+    "record_sha256": {"long_name": "SHA-256 of the file of a record"},
+    "record_accepted": {"long_name": "what is missing or implausible in a record, and was accepted"},
+    "record_baseline": {"long_name": "what was taken off a record"},
 }
+
+#: The attribute of a record that each variable holds: of the same name but for two.
+_ATTRIBUTES = {name: name for name in _ABOUT} | {"record_file": "record", "record_baseline": "baseline"}
 
 
 def embedded(motion: Record | Suite) -> dict[str, xr.Variable]:
     """The variables that hold a record or a suite."""
     records = motion.components if isinstance(motion, Suite) else (motion,)
-    samples = {
-        "record_time": np.concatenate([one.times for one in records]),
-        "record_acceleration": np.concatenate([one.acceleration for one in records]),
-    }
-    found = {name: xr.Variable((RECORD_DIM,), samples[name], about) for name, about in RECORD_SAMPLES.items()}
+    samples = np.concatenate([(one.times, one.acceleration) for one in records], axis=1)
+    described = zip(RECORD_SAMPLES.items(), samples, strict=True)
+    found = {name: xr.Variable((RECORD_DIM,), values, about) for (name, about), values in described}
     if isinstance(motion, Record):
         return found
     each = 2 if motion.has_pairs else 1
@@ -59,9 +55,9 @@ def embedded(motion: Record | Suite) -> dict[str, xr.Variable]:
     }
     if motion.has_pairs:
         columns[_COMPONENT] = np.tile(np.array([1, 2], np.int8), len(motion))
-    for key, (name, _) in _READING.items():
+    for name, key in _ATTRIBUTES.items():
         texts = [one.attrs.get(key, "") for one in records]
-        if any(texts):
+        if name not in columns and any(texts):
             columns[name] = np.array(texts, dtype=object)
     return found | {name: xr.Variable((SUITE_DIM,), values, _ABOUT[name]) for name, values in columns.items()}
 
@@ -74,9 +70,7 @@ def read_embedded(file: xr.Dataset, path: Path) -> Record | Suite | None:
     about = {key: str(text) for key, text in file.attrs.items() if key == "baseline" or key.startswith("record")}
     name = about.get("record", str(path))
     try:
-        if _COUNT not in file:
-            return Record(times, acceleration, name, about)
-        return _suite(file, times, acceleration)
+        return _suite(file, times, acceleration) if _COUNT in file else Record(times, acceleration, name, about)
     except InputError as error:
         raise InputError(f"{path}: {str(error).removeprefix(f'{name}: ')}") from None
 
@@ -84,15 +78,15 @@ def read_embedded(file: xr.Dataset, path: Path) -> Record | Suite | None:
 def _suite(file: xr.Dataset, times: NDArray[Any], acceleration: NDArray[Any]) -> Suite:
     counts = file[_COUNT].values.astype(np.int64)
     columns: dict[str, list[str]] = {
-        key: [str(text) for text in file[one].values]
-        for key, one in {"label": _LABEL, **{key: name for key, (name, _) in _READING.items()}}.items()
-        if one in file and file[one].dtype.kind in "OU"
+        key: [str(text) for text in file[name].values]
+        for name, key in _ATTRIBUTES.items()
+        if name in file and file[name].dtype.kind in "OU"
     }
     ends = np.cumsum(counts)
     whole = counts.ndim == 1 and counts.size and (counts > 0).all() and ends[-1] == times.size
-    if not whole or any(len(texts) != counts.size for texts in columns.values()) or "label" not in columns:
+    if not whole or any(len(texts) != counts.size for texts in columns.values()) or _LABEL not in columns:
         raise InputError(f"{_COUNT}, {_LABEL}: are not those of the {times.size} samples of its records")
-    labels = columns.pop("label")
+    labels = columns.pop(_LABEL)
     records = []
     for at, own in enumerate(zip(np.split(times, ends[:-1]), np.split(acceleration, ends[:-1]), strict=True)):
         attrs = {key: texts[at] for key, texts in columns.items() if texts[at]}

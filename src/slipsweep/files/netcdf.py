@@ -19,19 +19,9 @@ from slipsweep.motion.suites import Suite
 WITH_MISSING = ("sliding_mode", *RECORD_COUNTS)
 
 
-def described(
-    table: xr.Dataset,
-    *,
-    title: str,
-    command: str,
-    labels: tuple[str, ...] = (),
-    recorded: Record | Suite | None = None,
-    attrs: Mapping[str, str] | None = None,
-) -> xr.Dataset:
-    """Results as a file holds them: with labels of cases, the samples of the recorded motion, and global attributes."""
+def described(table: xr.Dataset, *, title: str, command: str, recorded: Record | Suite | None = None) -> xr.Dataset:
+    """Results as a file holds them: with the samples of the recorded motion, and global attributes."""
     found = table.copy()
-    if labels:
-        found = found.assign_coords(label=("case", np.array(labels, object), {"long_name": "name of the case"}))
     for name, one in dict(found.variables).items():
         if one.dtype.kind == "U":  # of any length
             found[name] = found[name].astype(object)
@@ -40,7 +30,7 @@ def described(
     if recorded is not None:
         found = found.assign(embedded(recorded))
     history = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} {command}"
-    found.attrs |= {"title": title, "Conventions": "CF-1.11", "history": history, **(attrs or {})}
+    found.attrs |= {"title": title, "Conventions": "CF-1.11", "history": history}
     return found
 
 
@@ -53,7 +43,7 @@ def fill_value(name: str, dtype: np.dtype[Any]) -> float | int | None:
 
 @contextmanager
 def new_file(
-    table: xr.Dataset, path: Path, lengths: Mapping[str, int] | None = None, compression: int = 0
+    table: xr.Dataset, path: Path | str, lengths: Mapping[str, int] | None = None, compression: int = 0
 ) -> Iterator[netCDF4.Dataset]:
     """Write what `described` gives; of variables that are dask arrays all but their values, which the caller writes.
 

@@ -96,12 +96,12 @@ def _open(path: str | os.PathLike[str]) -> xr.Dataset:
     """Open a netCDF file or a Zarr store, its values decoded but for codes."""
     # codes stay whole numbers: a fill value would make them floating-point ones
     codes = {name: False for name, dtype in known.RESULT_DTYPES.items() if np.dtype(dtype).kind == "i"}
+    how: dict[str, Any] = {"mask_and_scale": codes, "decode_times": False}
     place = place_of(path)
     if isinstance(place, str) or (place / "zarr.json").is_file():
         check_zarr(path)
         try:
-            how: dict[str, Any] = {"mask_and_scale": codes, "decode_times": False, "consolidated": False}
-            table = xr.open_zarr(os.fspath(path), chunks=None, **how)
+            table = xr.open_dataset(os.fspath(path), engine="zarr", consolidated=False, **how)
         except Exception as error:  # whatever the storage behind the address may raise
             raise InputError(f"{path}: cannot be read as a Zarr store: {_first_line(error)}") from None
         if "unfinished" in table.attrs:
@@ -114,7 +114,7 @@ def _open(path: str | os.PathLike[str]) -> xr.Dataset:
     if not place.is_file():
         raise InputError(f"{path}: is neither a netCDF file nor a Zarr store of format 3")
     try:
-        return xr.open_dataset(place, engine="netcdf4", mask_and_scale=codes, decode_times=False)
+        return xr.open_dataset(place, engine="netcdf4", **how)
     except PermissionError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     except Exception as error:  # netCDF4 and xarray raise what they like on a damaged file

@@ -3,7 +3,6 @@
 A worker that is lost costs its chunks once more: distributed computes them again on another.
 """
 
-import importlib
 import importlib.util
 import itertools
 import logging
@@ -25,7 +24,7 @@ from slipsweep.files.jobs import RUN, Job
 from slipsweep.files.opening import read_result
 from slipsweep.files.outputs import check_outputs, complete_or_absent
 from slipsweep.files.spec import named
-from slipsweep.files.storing import NetcdfChunks, Place, ZarrChunks
+from slipsweep.files.storing import Chunks, Place, ZarrChunks
 from slipsweep.grid.chunks import CHUNK_CELLS, chunk_lengths
 from slipsweep.grid.plans import Plan
 from slipsweep.grid.resources import size_text
@@ -96,8 +95,8 @@ def run(
     processes = workers or (64 if scheduler else 0)
     lengths = chunk_lengths(plan.sizes, _chunk_cells(plan, memory, processes, workers or 0), plan.together)
     is_zarr = isinstance(path, str) or path.suffix == ".zarr"
-    chunks = (ZarrChunks if is_zarr else NetcdfChunks)(job, path, lengths)
-    if chunks.count == 1 and not is_zarr and not processes and not Path(chunks.place).exists():
+    chunks = (ZarrChunks if is_zarr else Chunks)(job, path, lengths)
+    if lengths == plan.sizes and not is_zarr and not processes and not Path(chunks.place).exists():
         with named(job.spec.source):
             table = plan.solve(progress)
         with complete_or_absent(Path(path), overwrite) as temporary:
@@ -167,18 +166,16 @@ def _connected(workers: int | None, scheduler: str | None) -> "Iterator[Client]"
     # what it logs about lost workers is no news here: the run goes on, or ends with one message
     with silence_logging_cmgr(logging.CRITICAL):
         if scheduler is None:
-            with (
-                LocalCluster(
-                    n_workers=workers,
-                    threads_per_worker=1,
-                    host="127.0.0.1",
-                    dashboard_address="127.0.0.1:0",
-                    preload=[__name__],  # calls `dask_setup`
-                    memory_limit=0,  # chunks are sized to fit: no worker is to be paused or killed over them
-                    silence_logs=logging.CRITICAL,
-                ) as local,
-                Client(local) as client,
-            ):
+            local = LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                host="127.0.0.1",
+                dashboard_address="127.0.0.1:0",
+                preload=[__name__],  # calls `dask_setup`
+                memory_limit=0,  # chunks are sized to fit: no worker is to be paused or killed over them
+                silence_logs=logging.CRITICAL,
+            )
+            with local, Client(local) as client:
                 yield client
             return
         try:

@@ -65,12 +65,6 @@ def find(data: xr.Dataset, at: Mapping[str, At], where: str = "result") -> dict[
     prints can be typed.  It may hold several values, with commas; labels, or their numbers from 1.  A parameter that is
     one number for the whole result may be named too, with that number; it is not among what is returned.  InputError:
     there is no such axis, or a value lies outside of it.
-
-    >>> import slipsweep
-    >>> from slipsweep.files.selection import find
-    >>> result = slipsweep.sweep(5.0, 0.4, [2.0, 2.943, 4.0], 1.0)
-    >>> find(result, {"amplitude": "0.3g"})
-    {'amplitude': [Place(value=2.943, index=1)]}
     """
     known = [*map(str, data.sizes), *(str(name) for name, one in data.coords.items() if one.ndim == 0)]
     found = {}
@@ -123,8 +117,7 @@ def places_at(
 
 def selected(data: xr.Dataset, source: object, at: Mapping[str, At], kept: Collection[str]) -> xr.Dataset:
     """A result at values of its axes, but for those that are `kept` whole; as `places_at`."""
-    dims = [str(dim) for dim in data.sizes if dim not in kept]
-    return data.isel(places_at(data, source, at, dims), missing_dims="ignore")
+    return data.isel(places_at(data, source, at, [str(dim) for dim in data.sizes if dim not in kept]))
 
 
 def between(data: xr.Dataset, name: str, value: float) -> str:

@@ -34,6 +34,9 @@ _MODEL_PARAMETERS = (
     "yield_acceleration", "yield_coefficient", "decay_rate", "delta_mu", "minimum_friction", "structure_frequency",
 )  # fmt: skip
 
+#: Tables that are a choice with its options.
+_FAMILIES: tuple[choices.Family[Any], ...] = (options.MODELS, WAVEFORMS, options.SOLVERS)
+
 #: Keys of [excitation] that go with recorded motions.
 _RECORD_KEYS = ("record", "records", "pairs", *(one.name for one in choices.declared(reading.Reading)), "polarity")
 
@@ -54,26 +57,14 @@ KEYS: dict[str, dict[str, Any]] = {
     "axes": dict.fromkeys(_INPUTS),
     "axes.NAME": {"values": None, "start": None, "stop": None, "num": None, "spacing": "linear", "units": None},
     "cases": dict.fromkeys(("label", *_INPUTS)),
-    "model": {options.MODELS.key: options.MODELS.default}
-    | dict.fromkeys((*options.MODELS.options, *_MODEL_PARAMETERS))
-    | {"yield_acceleration": "coulomb"},
-    "excitation": {WAVEFORMS.key: WAVEFORMS.default}
-    | dict.fromkeys((*WAVEFORMS.options, *_RECORD_KEYS))
-    | {"polarity": 1},
-    "solver": {options.SOLVERS.key: options.SOLVERS.default} | dict.fromkeys(options.SOLVERS.options),
+    **{one.keyword: {one.key: one.default} | dict.fromkeys(one.options) for one in _FAMILIES},
     "output": asdict(Output()) | {"variables": list(variables.DEFAULT_RESULTS)},
-    "uncertainty": {
-        "samples": 4096,
-        "method": "sobol",
-        "seed": 0,
-        "quantiles": [0.05, 0.5, 0.95],
-        "thresholds": [0.01, 0.1, 1.0],
-        "correlation": [],
-        "sensitivity": False,
-        "over": [],
-    }
+    "uncertainty": {"samples": 4096, "method": "sobol", "seed": 0, "quantiles": [0.05, 0.5, 0.95]}
+    | {"thresholds": [0.01, 0.1, 1.0], "correlation": [], "sensitivity": False, "over": []}
     | dict.fromkeys(variables.DRAWN),
 }
+KEYS["model"] |= dict.fromkeys(_MODEL_PARAMETERS) | {"yield_acceleration": "coulomb"}
+KEYS["excitation"] |= dict.fromkeys(_RECORD_KEYS) | {"polarity": 1}
 
 #: Largest number of points on one axis: 80 MB of coordinates, more than any grid can use.
 _MOST_POINTS = 10_000_000
@@ -288,6 +279,7 @@ def _cases(rows: Any) -> list[dict[str, Any]]:
     return found
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def _axis(name: str, given: Any, g: float) -> NDArray[np.float64]:
     """An axis as an array in the parameter's own units."""
     key = f"axes.{name}"
@@ -311,13 +303,11 @@ def _axis(name: str, given: Any, g: float) -> NDArray[np.float64]:
             raise InputError(f"{key}.stop = {stop}: must be greater than start, {start}")
         if spacing == "log" and start <= 0.0:
             raise InputError(f'{key}.start = {start}: must be positive with spacing = "log"')
-        with np.errstate(over="ignore", invalid="ignore"):
-            numbers = np.linspace(start, stop, num) if spacing == "linear" else np.geomspace(start, stop, num)
+        numbers = np.linspace(start, stop, num) if spacing == "linear" else np.geomspace(start, stop, num)
     unit = table.get("units")
     if unit is not None and not isinstance(unit, str):
         raise InputError(f"axes.{name}.units = {units.show(unit)}: must be a text")
-    with np.errstate(over="ignore"):
-        values = numbers * units.conversion(f"axes.{name}.units", variables.PARAMETERS[name]["units"], unit, g)
+    values = numbers * units.conversion(f"axes.{name}.units", variables.PARAMETERS[name]["units"], unit, g)
     parameters.check_values(name, values, key)
     for at in np.flatnonzero(np.diff(values) <= 0.0):
         raise InputError(f"{key}: {numbers[at + 1]} after {numbers[at]}: must increase from one value to the next")

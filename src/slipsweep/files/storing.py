@@ -9,17 +9,16 @@ read whenever a run ends, and what is marked is there.  A compressed file is mad
 A store at an address (``s3://…``) is written where it is, and has the attribute `unfinished` meanwhile.
 """
 
-import itertools
 import json
 import math
 import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import netCDF4
 import numpy as np
@@ -31,7 +30,7 @@ from slipsweep.files import netcdf
 from slipsweep.files.jobs import Job
 from slipsweep.files.opening import check_zarr
 from slipsweep.files.outputs import EXISTS, appear, writing
-from slipsweep.grid.chunks import Chunk
+from slipsweep.grid.chunks import Chunk, grid_chunks
 from slipsweep.grid.plans import Plan
 from slipsweep.grid.resources import size_text
 
@@ -50,31 +49,26 @@ def nbytes_of(path: Place) -> int:
 
 @dataclass
 class Chunks:
-    """The chunks of a run, numbered in the order of the file, and where they are written."""
+    """The chunks of a run, numbered in the order of the file: parts of a netCDF file, which this process writes."""
 
     job: Job
     path: Place
     lengths: dict[str, int]  # of a chunk, along each dimension of the grid
     done: set[int] = field(default_factory=set)  # what an interrupted run has left
+    name: ClassVar[str] = "result.nc"  # of the file or store that chunks are written to, within `place`
 
     def __post_init__(self) -> None:
         self.place = f"{os.fspath(self.path).rstrip('/')}.part"  # what an interrupted run leaves: a folder
+        self.target = self.path if isinstance(self.path, str) else f"{self.place}/{self.name}"
         try:
             self._files, self._folder = url_to_fs(self.place)
         except (ImportError, ValueError) as error:  # the package that a protocol needs, or no protocol
             raise InputError(f"{self.path}: {error}") from None
 
-    @property
-    def count(self) -> int:
-        """How many chunks there are."""
-        return math.prod(math.ceil(size / self.lengths[dim]) for dim, size in self.job.plan.sizes.items())
-
     def __iter__(self) -> Iterator[tuple[int, Chunk]]:
         """Number and place of every chunk, one after the other: there may be more than memory holds."""
-        starts = [range(0, size, self.lengths[dim]) for dim, size in self.job.plan.sizes.items()]
-        for number, corner in enumerate(itertools.product(*starts)):
-            ends = (min(at + own.step, own.stop) for at, own in zip(corner, starts, strict=True))
-            yield number, dict(zip(self.job.plan.sizes, map(slice, corner, ends), strict=True))
+        plan = self.job.plan
+        return enumerate(grid_chunks(plan.sizes, math.prod(self.lengths.values()), plan.together))
 
     @contextmanager
     def begun(self, command: str, resume: bool, overwrite: bool) -> Iterator[None]:
@@ -83,7 +77,7 @@ class Chunks:
         InputError: neither may be done.  RunError: another run is writing it, or writing failed.  A note to any error
         says how many chunks are kept.
         """
-        with self._locked():
+        with self._locked() if isinstance(self.path, Path) else nullcontext():  # an address has no lock
             self._begin(command, resume, overwrite)
             try:
                 with writing(self.path):
@@ -92,30 +86,26 @@ class Chunks:
                 kept = len(self._finished())
                 if not kept:
                     self._clear()
-                note = f"{kept} of {self.count} chunks are kept in {self.place}: --resume goes on"
+                note = f"{kept} of {sum(1 for _ in self)} chunks are kept in {self.place}: --resume goes on"
                 error.add_note(note if kept else "nothing written")
                 raise
 
     @contextmanager
     def _locked(self) -> Iterator[None]:
-        """Keep other runs away from this output; an address has no lock."""
+        """Keep other runs away from this output."""
         from filelock import FileLock, Timeout
 
-        if isinstance(self.path, str):
-            yield
-            return
         folder = Path(self.place)
         with writing(self.path):
             folder.mkdir(exist_ok=True)
-            lock = FileLock(folder / "lock", timeout=0)
             try:
-                lock.acquire()
+                held = FileLock(folder / "lock").acquire(timeout=0)
             except Timeout:
                 raise RunError(f"{self.path}: another run is writing it") from None
         try:
-            yield
+            with held:
+                yield
         finally:
-            lock.release()
             if folder.is_dir() and not (folder / "identity.json").exists():
                 shutil.rmtree(folder, ignore_errors=True)
 
@@ -168,6 +158,9 @@ class Chunks:
 
     def make(self, command: str) -> None:
         """Make the file or store that chunks are written to."""
+        with netcdf.new_file(self.job.outline(command), self.target) as file:
+            for name in self.job.dtypes:  # with its first value an array gets its place in the file
+                file[name][(0,) * file[name].ndim or ...] = 0
 
     def task(self, number: int, chunk: Chunk) -> Callable[[], xr.Dataset | None]:
         """What computes a chunk, here or in a worker: it returns the results, unless it has written them itself."""
@@ -175,9 +168,40 @@ class Chunks:
 
     def write(self, number: int, chunk: Chunk, results: xr.Dataset) -> None:
         """Write the results of a chunk, then its mark."""
+        with netCDF4.Dataset(self.target, "r+") as file:
+            file.set_auto_maskandscale(False)
+            for name in self.job.dtypes:
+                file[name][_region(chunk, file[name])] = results[name].values
+        with open(self.target, "rb") as written:
+            os.fsync(written.fileno())  # a power cut can no longer take it
+        _mark(self.place, number)
+
+    def completed(self) -> str:
+        """The file or store when all chunks are there, compressed as requested, and not said to be unfinished."""
+        level = self.job.spec.output.compression
+        if not level:
+            return self.target
+        compressed = f"{self.place}/compressed.nc"
+        with netCDF4.Dataset(self.target) as source:
+            source.set_auto_maskandscale(False)
+            outline = self.job.outline("").assign_attrs(history=source.history)
+            with netcdf.new_file(outline, compressed, self.lengths, level) as file:
+                for _, chunk in self:
+                    for name in self.job.dtypes:
+                        region = _region(chunk, file[name])
+                        file[name][region] = source[name][region]
+        return compressed
 
     def finish(self, overwrite: bool) -> None:
         """Give the output its name."""
+        complete = self.completed()
+        if isinstance(self.path, Path):
+            appear(Path(complete), self.path, overwrite)
+        self._files.rm(self._folder, recursive=True)
+
+
+def _region(chunk: Chunk, result: netCDF4.Variable) -> Any:
+    return tuple(chunk.get(dim, slice(None)) for dim in result.dimensions) or ...
 
 
 def _solved(plan: Plan, dtypes: Mapping[str, np.dtype[Any]], chunk: Chunk) -> xr.Dataset:
@@ -192,96 +216,45 @@ def _mark(place: str, number: int) -> None:
     files.pipe_file(f"{folder}/{number:06}.chunk", b"")
 
 
-class NetcdfChunks(Chunks):
-    """Chunks as parts of a netCDF file, which this process alone writes."""
-
-    @property
-    def result(self) -> Path:
-        """The file that chunks are written to."""
-        return Path(self.place, "result.nc")
-
-    def make(self, command: str) -> None:
-        with netcdf.new_file(self.job.outline(command), self.result) as file:
-            for name in self.job.dtypes:  # with its first value an array gets its place in the file
-                file[name][(0,) * file[name].ndim or ...] = 0
-
-    def write(self, number: int, chunk: Chunk, results: xr.Dataset) -> None:
-        with netCDF4.Dataset(self.result, "r+") as file:
-            file.set_auto_maskandscale(False)
-            for name in self.job.dtypes:
-                file[name][_region(chunk, file[name])] = results[name].values
-        with self.result.open("rb") as written:
-            os.fsync(written.fileno())  # a power cut can no longer take it
-        _mark(self.place, number)
-
-    def finish(self, overwrite: bool) -> None:
-        complete = self.result
-        if level := self.job.spec.output.compression:
-            complete = Path(self.place, "compressed.nc")
-            with netCDF4.Dataset(self.result) as source:
-                source.set_auto_maskandscale(False)
-                outline = self.job.outline("").assign_attrs(history=source.history)
-                with netcdf.new_file(outline, complete, self.lengths, level) as file:
-                    for _, chunk in self:
-                        for name in self.job.dtypes:
-                            region = _region(chunk, file[name])
-                            file[name][region] = source[name][region]
-        appear(complete, Path(self.path), overwrite)
-        shutil.rmtree(self.place)
-
-
-def _region(chunk: Chunk, result: netCDF4.Variable) -> Any:
-    return tuple(chunk.get(dim, slice(None)) for dim in result.dimensions) or ...
-
-
 class ZarrChunks(Chunks):
     """Chunks as regions of a Zarr store, each one shard of its arrays; workers write those that they solve."""
 
-    @property
-    def store(self) -> str:
-        """The store that chunks are written to."""
-        return self.path if isinstance(self.path, str) else f"{self.place}/store"
+    name = "store"
 
     def make(self, command: str) -> None:
         check_zarr(self.path)
-        table = self.job.outline(command).assign_attrs(unfinished="its run goes on with --resume")
-        encoding = {name: self._encoding(table[name]) for name in self.job.dtypes}
-        table.to_zarr(self.store, mode="w", compute=False, encoding=encoding, zarr_format=3, consolidated=False)
-
-    def _encoding(self, one: xr.DataArray) -> dict[str, Any]:
-        """A shard for each chunk of the run, and within it chunks that are read by themselves."""
         from zarr.codecs import ZstdCodec
 
-        shard = [self.lengths.get(str(dim), size) for dim, size in one.sizes.items()]
-        inner = list(shard)
-        for axis in range(len(inner)):
-            if math.prod(inner) > _ZARR_CELLS:
-                inner[axis] = 1
-        found: dict[str, Any] = {"_FillValue": netcdf.fill_value(str(one.name), one.dtype)}
-        if shard:
-            found |= {"chunks": inner, "shards": shard}
-        if level := self.job.spec.output.compression:
-            found["compressors"] = [ZstdCodec(level=level)]
-        return found
+        table = self.job.outline(command).assign_attrs(unfinished="its run goes on with --resume")
+        level = self.job.spec.output.compression
+        encoding: dict[str, dict[str, Any]] = {}
+        for name, dtype in self.job.dtypes.items():
+            # a shard for each chunk of the run, and within it chunks that are read by themselves
+            shard = [self.lengths.get(str(dim), size) for dim, size in table[name].sizes.items()]
+            inner = list(shard)
+            for axis in range(len(inner)):
+                if math.prod(inner) > _ZARR_CELLS:
+                    inner[axis] = 1
+            encoding[name] = {"_FillValue": netcdf.fill_value(name, dtype)}
+            encoding[name] |= {"chunks": inner, "shards": shard} if shard else {}
+            encoding[name] |= {"compressors": [ZstdCodec(level=level)]} if level else {}
+        table.to_zarr(self.target, mode="w", compute=False, encoding=encoding, zarr_format=3, consolidated=False)
 
     def task(self, number: int, chunk: Chunk) -> Callable[[], None]:
         solve = partial(_solved, self.job.plan, self.job.dtypes, chunk)
-        return partial(_write_region, solve, chunk, self.store, self.place, number)
+        return partial(_write_region, solve, chunk, self.target, self.place, number)
 
-    def finish(self, overwrite: bool) -> None:
+    def completed(self) -> str:
         import zarr
 
-        del zarr.open_group(self.store, mode="r+").attrs["unfinished"]
-        if isinstance(self.path, Path):
-            appear(Path(self.store), self.path, overwrite)
-        self._files.rm(self._folder, recursive=True)
+        del zarr.open_group(self.target, mode="r+").attrs["unfinished"]
+        return self.target
 
 
 def _write_region(solve: Callable[[], xr.Dataset], chunk: Chunk, store: str, place: str, number: int) -> None:
     """Compute a chunk and write it to its region of a Zarr store, then its mark."""
     results = solve()
     for name, one in results.items():
-        region: Any = {dim: chunk[str(dim)] for dim in one.dims if dim in chunk}
-        how: Any = {"region": region} if region else {"mode": "r+"}
-        results[[name]].to_zarr(store, zarr_format=3, consolidated=False, **how)
+        region: Any = {dim: chunk[str(dim)] for dim in one.dims if dim in chunk} or None
+        results[[name]].to_zarr(store, mode="r+", region=region, zarr_format=3, consolidated=False)
     _mark(place, number)
