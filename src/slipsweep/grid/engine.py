@@ -140,8 +140,8 @@ def motions(request: Request) -> Iterator[tuple[Chunk, Request]]:
 def cell_inputs(problem: Problem, inputs: Variables) -> dict[str, xr.Variable]:
     """The fields of `Cell` that are given; the amplitude is that of a waveform, or the factor on a record."""
     given: dict[str, Any] = dict(inputs)
-    if isinstance(problem.excitation, Record):
-        given["amplitude"] = strength_factor(problem.excitation, inputs)
+    if isinstance(record := problem.excitation, Record):
+        given["amplitude"] = strength_factor(record.times, record.acceleration, inputs)
     elif "displacement_amplitude" in inputs:
         given["amplitude"] = peak_acceleration(inputs["displacement_amplitude"], inputs["frequency"])
     if "yield_coefficient" in inputs:

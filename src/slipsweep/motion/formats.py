@@ -3,6 +3,7 @@
 docs/records.md#files describes the formats.
 """
 
+import hashlib
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import TypeAlias
 import numpy as np
 
 from slipsweep.errors import InputError
-from slipsweep.model.parameters import LARGEST, shown
+from slipsweep.model.parameters import LARGEST, check_choice, shown
 from slipsweep.motion.intensity import Floats
 from slipsweep.motion.reading import UNITS, Reading
 
@@ -26,14 +27,14 @@ _INTERVAL = rf"(?i)\b(?:dt|interval)\s*[=:]\s*{_NUMBER}"  # in the header of a f
 Samples: TypeAlias = tuple[Floats, Floats, str | None]
 
 
-def read_lines(path: Path) -> tuple[bytes, list[str]]:
-    """The content of a file, and its lines (InputError: it cannot be read)."""
+def read_lines(path: Path) -> tuple[str, list[str]]:
+    """The SHA-256 of a file, and its lines (InputError: it cannot be read)."""
     try:
         content = path.read_bytes()
     except (OSError, ValueError) as error:  # ValueError: a name that no system has
         raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
     # some editors put a byte-order mark in front; headers of old files are in whatever alphabet
-    return content, content.decode("utf-8-sig", errors="replace").splitlines()
+    return hashlib.sha256(content).hexdigest(), content.decode("utf-8-sig", errors="replace").splitlines()
 
 
 def read_samples(path: Path, lines: list[str], reading: Reading) -> tuple[str, Floats, Floats, str]:
@@ -148,9 +149,7 @@ def _esm(lines: list[str], reading: Reading) -> Samples:
     known = {"SAMPLING_INTERVAL_S": _NUMBER, "NDATA": _COUNT, "UNITS": r"(\S+)"}
     patterns = {name: rf"^{name}:\s*{pattern}\s*$" for name, pattern in known.items()}
     interval, points, unit = _fields("\n".join(lines[:at]), patterns)
-    unit = unit.lower().replace("^", "")
-    if unit not in UNITS:
-        raise InputError(f"UNITS = {shown(unit)}: must be one of {', '.join(map(repr, UNITS))}")
+    unit = check_choice("UNITS", unit.lower().replace("^", ""), UNITS)
     return _even(_numbers(enumerate(lines[at:], at + 1)), float(interval), unit, int(points))
 
 
@@ -291,7 +290,7 @@ def read_columns(
 
     values = {what: np.empty(len(rows) - 1) for what in columns}
     for row, (number, line) in enumerate(rows[1:]):
-        cells = [(cell if separator == "," else cell.replace(",", ".")).strip() for cell in line.split(separator)]
+        cells = [cell.strip().replace(",", ".") for cell in line.split(separator)]
         if len(cells) != len(names):
             raise InputError(f"{path}: line {number}: {len(cells)} cells, where {len(names)} columns are named")
         for what, (at, factor) in columns.items():

@@ -8,7 +8,6 @@ acceleration but what `baseline` took off when it was read.  "g" is standard gra
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,15 +20,6 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """Samples of acceleration (m/s²) against time (s), as measures are taken of them."""
-
-    times: Floats
-    acceleration: Floats
-
-
 #: Frequencies that the mean period is of, Hz, and their largest spacing (Rathje et al. 1998, 2004).
 _LOWEST, _HIGHEST, _SPACING = 0.25, 20.0, 0.05
 
@@ -37,20 +27,20 @@ _LOWEST, _HIGHEST, _SPACING = 0.25, 20.0, 0.05
 _RESAMPLED, _MOST_SAMPLES = 0.005, 2**22
 
 
-def intensity_measures(record: Motion) -> dict[str, float]:
-    """All measures of `variables.INTENSITY_MEASURES` of a record; NaN where one is not defined."""
+def intensity_measures(times: Floats, acceleration: Floats) -> dict[str, float]:
+    """All of `variables.INTENSITY_MEASURES`, of samples of acceleration (m/s²); NaN where one is not defined."""
     return {
-        "pga": float(np.abs(record.acceleration).max()),
-        "pgv": peak_velocity(record),
-        "pgd": peak_displacement(record),
-        "arias_intensity": arias_intensity(record),
-        "cav": cumulative_absolute_velocity(record),
-        "significant_duration": significant_duration(record),
-        "mean_period": mean_period(record),
+        "pga": float(np.abs(acceleration).max()),
+        "pgv": peak_velocity(times, acceleration),
+        "pgd": peak_displacement(times, acceleration),
+        "arias_intensity": arias_intensity(times, acceleration),
+        "cav": cumulative_absolute_velocity(times, acceleration),
+        "significant_duration": significant_duration(times, acceleration),
+        "mean_period": mean_period(times, acceleration),
     }
 
 
-def strength_factor(record: Motion, given: Mapping[str, Any]) -> Any:
+def strength_factor(times: Floats, acceleration: Floats, given: Mapping[str, Any]) -> Any:
     """What the acceleration of a record is multiplied by, for the strength that is given, and `time_scale`.
 
     The strength is one of `scale`, `amplitude` (m/s²), `pgv` (m/s) and `arias_intensity` (m/s).  The last two grow with
@@ -60,40 +50,41 @@ def strength_factor(record: Motion, given: Mapping[str, Any]) -> Any:
         if "scale" in given:
             return given["scale"]
         if "amplitude" in given:
-            return given["amplitude"] / np.abs(record.acceleration).max()
+            return given["amplitude"] / np.abs(acceleration).max()
         if "pgv" in given:
-            return given["pgv"] / (peak_velocity(record) * given["time_scale"])
-        return np.sqrt(given["arias_intensity"] / (np.float64(arias_intensity(record)) * given["time_scale"]))
+            return given["pgv"] / (peak_velocity(times, acceleration) * given["time_scale"])
+        own = np.float64(arias_intensity(times, acceleration))
+        return np.sqrt(given["arias_intensity"] / (own * given["time_scale"]))
 
 
-def peak_velocity(record: Motion) -> float:
+def peak_velocity(times: Floats, acceleration: Floats) -> float:
     """Peak ground velocity, max |∫ Üg dt|, m/s."""
-    acceleration = _lines(record)
-    return _largest(acceleration.antiderivative(), acceleration)
+    lines = _lines(times, acceleration)
+    return _largest(lines.antiderivative(), lines)
 
 
-def peak_displacement(record: Motion) -> float:
+def peak_displacement(times: Floats, acceleration: Floats) -> float:
     """Peak ground displacement, max |∫∫ Üg dt dt|, m."""
-    velocity = _lines(record).antiderivative()
+    velocity = _lines(times, acceleration).antiderivative()
     return _largest(velocity.antiderivative(), velocity)
 
 
-def arias_intensity(record: Motion) -> float:
+def arias_intensity(times: Floats, acceleration: Floats) -> float:
     """Arias intensity π/(2g) ∫ Üg² dt, m/s (Arias 1970)."""
-    return math.pi / (2.0 * STANDARD_GRAVITY) * float(_energy(record)(record.times[-1]))
+    return math.pi / (2.0 * STANDARD_GRAVITY) * float(_energy(times, acceleration)(times[-1]))
 
 
-def cumulative_absolute_velocity(record: Motion) -> float:
+def cumulative_absolute_velocity(times: Floats, acceleration: Floats) -> float:
     """Cumulative absolute velocity ∫ |Üg| dt, m/s (EPRI 1988; Kramer 1996, section 3.3)."""
-    times = np.union1d(record.times, _zeros(_lines(record)))
-    return float(np.trapezoid(np.abs(np.interp(times, record.times, record.acceleration)), times))
+    places = np.union1d(times, _zeros(_lines(times, acceleration)))
+    return float(np.trapezoid(np.abs(np.interp(places, times, acceleration)), places))
 
 
-def significant_duration(record: Motion) -> float:
+def significant_duration(times: Floats, acceleration: Floats) -> float:
     """Time between 5 % and 95 % of the Arias intensity, s (Trifunac and Brady 1975)."""
     from scipy.optimize import brentq
 
-    energy, (first, last) = _energy(record), (record.times[0], record.times[-1])
+    energy, (first, last) = _energy(times, acceleration), (times[0], times[-1])
     total = float(energy(last))
     if not total > 0.0:
         return 0.0
@@ -104,17 +95,17 @@ def significant_duration(record: Motion) -> float:
     return reached(0.95) - reached(0.05)
 
 
-def mean_period(record: Motion) -> float:
+def mean_period(times: Floats, acceleration: Floats) -> float:
     """Mean period Tm = Σ Cᵢ²/fᵢ / Σ Cᵢ², s, over 0.25 Hz ≤ fᵢ ≤ 20 Hz (Rathje, Abrahamson and Bray 1998).
 
     Cᵢ are the amplitudes of the discrete Fourier transform, at frequencies at most 0.05 Hz apart: a motion shorter
     than 20 s is continued with zeros (Rathje et al. 2004).  One that is not evenly sampled is sampled anew, at its
     median interval or, if that is longer, every 0.005 s.  NaN of a motion without such frequencies.
     """
-    times, spacing = record.times, spacing_of(record.times)
+    spacing = spacing_of(times)
     step = float(spacing[0]) if np.ptp(spacing) == 0.0 else min(float(np.median(spacing)), _RESAMPLED)
     step = max(step, max(float(np.ptp(times)), 1.0 / _SPACING) / _MOST_SAMPLES)
-    samples = np.interp(np.arange(times[0], times[-1] + 1e-6 * step, step), times, record.acceleration)
+    samples = np.interp(np.arange(times[0], times[-1] + 1e-6 * step, step), times, acceleration)
     length = max(samples.size, math.ceil(1.0 / (_SPACING * step)))
     frequency = np.fft.rfftfreq(length, step)
     chosen = (frequency >= _LOWEST * (1.0 - 1e-12)) & (frequency <= _HIGHEST * (1.0 + 1e-12))
@@ -132,17 +123,17 @@ def spacing_of(times: Floats) -> Floats:
     return np.full(times.size - 1, (times[-1] - times[0]) / (times.size - 1)) if is_even else np.diff(times)
 
 
-def _lines(record: Motion) -> "PPoly":
+def _lines(times: Floats, acceleration: Floats) -> "PPoly":
     """The straight lines between the samples."""
     from scipy.interpolate import PPoly  # only here: a sweep under a waveform does not wait for it
 
-    slope = np.diff(record.acceleration) / np.diff(record.times)
-    return PPoly(np.array([slope, record.acceleration[:-1]]), record.times)
+    slope = np.diff(acceleration) / np.diff(times)
+    return PPoly(np.array([slope, acceleration[:-1]]), times)
 
 
-def _energy(record: Motion) -> "PPoly":
+def _energy(times: Floats, acceleration: Floats) -> "PPoly":
     """∫ Üg² dt over time."""
-    lines = _lines(record)
+    lines = _lines(times, acceleration)
     slope, first = lines.c
     return type(lines)(np.array([slope * slope, 2.0 * slope * first, first * first]), lines.x).antiderivative()
 

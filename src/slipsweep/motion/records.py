@@ -1,23 +1,39 @@
 """Recorded motions: acceleration against time, read with units, baseline and polarity explicit."""
 
-import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.model.parameters import LARGEST, check_choice, check_numbers, check_single, shown
-from slipsweep.motion import formats, inspection
-from slipsweep.motion.intensity import Floats, Motion, peak_velocity
+from slipsweep.motion import formats
+from slipsweep.motion.intensity import Floats, peak_displacement, peak_velocity
 from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS, Baseline, Format, Gaps, Implausible, Reading, Unit
+
+#: An interval of more median ones than this is a gap.  Of fewer samples than the second, typed by hand, nothing is said
+#: but of values that cannot be.
+_GAP, _FEWEST = 5.0, 16
+
+#: Magnitudes that programs write where they have no value.
+_FILL = np.array([999.0, 9999.0, 99999.0, 999999.0, 999.9, 999.99, 9999.9, 9999.99, 32767.0, 32768.0, 1e20, 1e30])
+
+#: A value that is held for so long (s, and samples) while the ground shakes is of a sensor that stands still.
+_HELD, _HELD_SAMPLES = 0.5, 20
+
+#: Peaks that were recorded lie between these, g: the largest ever are 2.7 horizontally, 4 vertically.
+_WEAKEST, _STRONGEST = 0.001, 3.0
+
+#: Displacement of the ground (m) that is a drift where the velocity at the end is more than a share of the peak's, and
+#: one that is a drift anyhow: the largest along a fault are 9.
+_DRIFT, _DRIFT_VELOCITY, _LARGEST_DISPLACEMENT = 2.0, 0.05, 10.0
 
 
 @dataclass(frozen=True, eq=False)
-class Record(Motion):
+class Record:
     """A recorded acceleration, interpolated linearly between samples.
 
     Attributes
@@ -48,6 +64,8 @@ class Record(Motion):
     Record('short': 5 samples, 0.4 s, peak 2 m/s2)
     """
 
+    times: Floats
+    acceleration: Floats
     name: str = "record"
     attrs: dict[str, str] = field(default_factory=dict)
 
@@ -144,7 +162,7 @@ class Record(Motion):
         read = "".join(text + self.attrs[name] for text, name in notes.items() if name in self.attrs)
         return (
             f"{self.name}: {np.ptp(self.times):.4g} s at {np.median(np.diff(self.times)):.4g} s, PGA "
-            f"{self.peak / STANDARD_GRAVITY:.4g} g, PGV {peak_velocity(self):.4g} m/s{read}"
+            f"{self.peak / STANDARD_GRAVITY:.4g} g, PGV {peak_velocity(self.times, self.acceleration):.4g} m/s{read}"
         )
 
 
@@ -224,9 +242,9 @@ def read_record(
     """
     reading = Reading(units, interval, baseline, gaps, implausible, format, channel)
     path = Path(path)
-    content, lines = formats.read_lines(path)
+    digest, lines = formats.read_lines(path)
     kind, times, values, unit = formats.read_samples(path, lines, reading)
-    attrs = {"record": path.name, "record_format": kind, "record_sha256": hashlib.sha256(content).hexdigest()}
+    attrs = {"record": path.name, "record_format": kind, "record_sha256": digest}
     if reading.channel is not None:
         attrs["record_channel"] = str(reading.channel)
     return _inspected(str(path), times, values, unit, reading, attrs)
@@ -234,13 +252,84 @@ def read_record(
 
 def _inspected(name: str, times: Floats, values: Floats, unit: str, reading: Reading, attrs: dict[str, str]) -> Record:
     """The record of values in a unit; what is found in it is refused, unless `reading` accepts it."""
-    times, values, missing = inspection.without_fill_values(times, values)
+    kept, missing = ~_is_fill(values), "; ".join(missing_samples(times, values))
     if missing and reading.gaps == "refuse":
         raise InputError(f"{name}: {missing}: samples are missing; gaps = 'linear' interpolates between the others")
-    record = Record(times, values * UNITS[unit], name, attrs | {"record_units": unit})
+    record = Record(times[kept], values[kept] * UNITS[unit], name, attrs | {"record_units": unit})
     record = record.corrected(reading.baseline)
-    odd = "; ".join(filter(None, (inspection.odd_peak(record, unit), inspection.drift(record))))
+    odd = "; ".join(_implausible(record, unit))
     if odd and reading.implausible == "refuse":
         raise InputError(f"{name}: {odd}; or implausible = 'accept' takes the record as it is")
     accepted = "; ".join(filter(None, (missing, odd)))
     return replace(record, attrs=record.attrs | {"record_accepted": accepted}) if accepted else record
+
+
+def missing_samples(times: Floats, values: Floats) -> Iterator[str]:
+    """Values, in any unit, that stand for missing samples, intervals without samples, a value that is held."""
+    if (fill := _is_fill(values)).any():
+        kinds = ", ".join("blank" if np.isnan(one) else f"{one:g}" for one in np.unique(values[fill])[:3])
+        yield f"{fill.sum()} fill value{'s' if fill.sum() > 1 else ''} ({kinds}), first at t = {times[fill][0]:.6g} s"
+    intervals = np.diff(times)
+    if intervals.size < _FEWEST or not (intervals > 0.0).all():
+        return
+    median = float(np.median(intervals))
+    wide = np.flatnonzero(intervals > _GAP * median)
+    for at in wide[:1]:
+        more = f", and {wide.size - 1} more" if wide.size > 1 else ""
+        yield (
+            f"no samples from t = {times[at]:.6g} to {times[at + 1]:.6g} s ({intervals[at] / median:.0f} times the "
+            f"median interval of {median:.4g} s){more}"
+        )
+    yield from _held(times[~fill], values[~fill])
+
+
+def _is_fill(values: Floats) -> NDArray[np.bool_]:
+    """Which values stand for missing samples."""
+    missing, magnitude = np.isnan(values), np.abs(np.nan_to_num(values))
+    known = np.isin(magnitude, _FILL)
+    others = np.flatnonzero(~known & ~missing)
+    if known.any() and others.size:
+        # 999 gal may be a peak: then its neighbours are on the way to it
+        between = np.interp(np.arange(values.size), others, values[others])
+        missing |= known & (np.abs(values - between) > 0.5 * magnitude)
+    # the same number again and again, far above all others
+    largest = magnitude == magnitude.max(initial=0.0)
+    rest = magnitude[~largest].max(initial=0.0)
+    is_alone = largest.sum() > 1 and magnitude.max(initial=0.0) > 20.0 * rest > 0.0 and values.size > _FEWEST
+    return missing | (largest & is_alone)
+
+
+def _held(times: Floats, values: Floats) -> Iterator[str]:
+    """The first value that does not change while the ground shakes."""
+    starts = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
+    lasts = np.flatnonzero(np.diff(values, append=np.nan) != 0.0)
+    own, peak = values[starts], np.abs(values).max(initial=0.0)
+    before, after = values[np.maximum(starts - 1, 0)], values[np.minimum(lasts + 1, values.size - 1)]
+    jumps = np.minimum(np.abs(before - own), np.abs(after - own))
+    shakes = (np.abs(own) > 0.01 * peak) | (jumps > 0.05 * peak)  # else the ground is at rest
+    long = (lasts - starts >= _HELD_SAMPLES) & (times[lasts] - times[starts] >= _HELD)
+    for at in np.flatnonzero(shakes & long)[:1]:
+        yield f"the value {own[at]:.6g} is held from t = {times[starts[at]]:.6g} to {times[lasts[at]]:.6g} s"
+
+
+def _implausible(record: Record, unit: str) -> Iterator[str]:
+    """A peak that was never recorded, read in `unit`, and the unit that would explain it; a ground that moves away."""
+    times, acceleration = record.times, record.acceleration
+    at, is_short = int(np.abs(acceleration).argmax()), times.size <= _FEWEST
+    peak = acceleration[at] / STANDARD_GRAVITY
+    if abs(peak) > _STRONGEST or (abs(peak) < _WEAKEST and not is_short):
+        in_unit = {other: abs(peak) * factor / UNITS[unit] for other, factor in UNITS.items()}
+        likely = min(in_unit, key=lambda other: abs(np.log(max(in_unit[other], 1e-300) / 0.3)))
+        explains = 0.02 <= in_unit[likely] <= 1.5
+        hint = f" (read in {unit}; in {likely} it would be {in_unit[likely]:.3g} g)" if explains else ""
+        limit = f"above {_STRONGEST:g} g" if abs(peak) > 1.0 else f"below {_WEAKEST:g} g"
+        yield f"peak acceleration {peak:.4g} g at t = {times[at]:.6g} s{hint}: {limit}, check units and header"
+    if is_short:
+        return
+    displacement, end = peak_displacement(times, acceleration), float(np.trapezoid(acceleration, times))
+    moves_on = displacement > _DRIFT and abs(end) > _DRIFT_VELOCITY * peak_velocity(times, acceleration)
+    if moves_on or displacement > _LARGEST_DISPLACEMENT:  # as the integral of an offset does
+        yield (
+            f"the ground moves {displacement:.3g} m and has a velocity of {end:.3g} m/s at t = {times[-1]:.6g} s: "
+            "an offset or a drift; baseline = 'linear' takes a straight line off the acceleration"
+        )

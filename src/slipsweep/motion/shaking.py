@@ -3,7 +3,6 @@
 Nothing is taken off a channel here but what is asked for (`ShakingTest.corrected`).
 """
 
-import hashlib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,10 +15,9 @@ from slipsweep.model.parameters import check_choice, check_finite, check_list, c
 from slipsweep.model.units import conversion
 from slipsweep.model.variables import HISTORY
 from slipsweep.motion.formats import read_columns, read_lines
-from slipsweep.motion.inspection import without_fill_values
 from slipsweep.motion.intensity import Floats
 from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS
-from slipsweep.motion.records import check_samples
+from slipsweep.motion.records import check_samples, missing_samples
 
 #: What is measured of the table, and what the block may be measured by.
 TABLE, RESPONSES = "ground_acceleration", ("block_acceleration", "relative_velocity", "relative_displacement")
@@ -126,13 +124,13 @@ def read_test(path: str | Path) -> ShakingTest:
             raise InputError(f"{path}: column {shown(column)}: must give its unit in brackets, such as (m/s2)")
         return (channel, unit_factor(f"{path}: column {column}: unit", channel, unit)) if channel else None
 
-    content, lines = read_lines(path)
+    digest, lines = read_lines(path)
     example = "time (s), table acceleration (m/s2), block acceleration (m/s2)"
     values = read_columns(path, lines, channel_of, ("time", TABLE), example)
-    if missing := without_fill_values(values["time"], values[TABLE])[2]:
+    if missing := "; ".join(missing_samples(values["time"], values[TABLE])):
         raise InputError(f"{path}: {TABLE}: {missing}: samples are missing; take the part of the test that has all")
     name = path.name.encode(errors="backslashreplace").decode()
-    attrs = {"test": name, "test_sha256": hashlib.sha256(content).hexdigest()}
+    attrs = {"test": name, "test_sha256": digest}
     return ShakingTest(values.pop("time"), values, str(path), attrs)
 
 

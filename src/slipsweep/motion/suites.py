@@ -138,7 +138,7 @@ class Suite:
         if len({type(motion) for motion in motions}) != 1:
             raise InputError(f"motions: {len(motions)}: must be one at least, all Records or all Pairs")
         labels = tuple(check_list("labels", self.labels, "texts"))
-        labels = labels or _labels([Path(_components(one)[0].name) for one in motions])
+        labels = labels or tuple(_labels([Path(_components(one)[0].name) for one in motions]))
         for label in labels:
             if not isinstance(label, str) or not label.strip() or not label.isprintable():
                 raise InputError(f"labels: {shown(label)}: must be a text that can be printed")
@@ -203,7 +203,8 @@ class Suite:
     def intensities(self, places: NDArray[np.int64], azimuths: Floats) -> dict[str, Floats]:
         """Intensity measures of the motions at some places, each at its azimuth; the arrays have one shape."""
         both, shape = zip(places.flat, azimuths.flat, strict=True), azimuths.shape
-        cells = [intensity_measures(self.record(int(at), float(azimuth))) for at, azimuth in both]
+        records = [self.record(int(at), float(azimuth)) for at, azimuth in both]
+        cells = [intensity_measures(one.times, one.acceleration) for one in records]
         return {f"motion_{name}": np.reshape([cell[name] for cell in cells], shape) for name in INTENSITY_MEASURES}
 
     def record(self, at: int, azimuth: float) -> Record:
@@ -348,24 +349,18 @@ def _paired(sources: Sequence[_Source], endings: Sequence[str]) -> tuple[list[_S
         raise InputError(f"pairs = {shown(endings)}: must be two different endings of names, such as ('_NS', '_EW')")
     first, second = texts
     parts = list(chain.from_iterable(sources))
-    pairs = {
-        one: one.with_name(one.stem.removesuffix(first) + second + one.suffix)
-        for one in parts
-        if isinstance(one, Path) and one.stem.endswith(first)
-    }
-    whole = {one for pair in pairs.items() for one in pair if {*pair} <= {*parts}}
+    stems = {one: one.stem.removesuffix(first) for one in parts if isinstance(one, Path) and one.stem.endswith(first)}
+    pairs: list[_Source] = [(one, one.with_name(stem + second + one.suffix)) for one, stem in stems.items()]
+    whole = {one for pair in pairs if {*pair} <= {*parts} for one in pair}
     if incomplete := ", ".join(one.name for one in parts if one not in whole):
         raise InputError(f"pairs = {shown(endings)}: without the other component: {incomplete}")
-    stems = [one.with_name(one.stem.removesuffix(first).rstrip("_-. ") or one.stem) for one in pairs]
-    return list(pairs.items()), _labels(stems)
+    return pairs, tuple(_labels([one.with_name(stem.rstrip("_-. ") or one.stem) for one, stem in stems.items()]))
 
 
-def _labels(paths: Sequence[Path]) -> tuple[str, ...]:
+def _labels(paths: Sequence[Path]) -> Iterator[str]:
     """The stems of files; with folder and ending where stems are alike, and numbered where that does not help."""
     stems, seen = Counter(path.stem for path in paths), Counter[str]()
-    labels = []
     for path in paths:
         label = "/".join(path.parts[-2:]) if stems[path.stem] > 1 else path.stem.strip() or "motion"
         seen[label] += 1
-        labels.append(f"{label} ({seen[label]})" if seen[label] > 1 else label)
-    return tuple(labels)
+        yield f"{label} ({seen[label]})" if seen[label] > 1 else label

@@ -5,7 +5,6 @@ exact for the straight lines between points that `displacement_hazard` names.
 """
 
 import csv
-import hashlib
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -106,8 +105,8 @@ def read_hazard_curve(path: str | Path, g: float, site: int | None = None) -> Ha
         path = Path(path)
     except TypeError:
         raise InputError(f"curve = {shown(path)}: must be the path of a CSV file, or a HazardCurve") from None
-    content, lines = read_lines(path)
-    about = {"hazard_curve_sha256": hashlib.sha256(content).hexdigest()}
+    digest, lines = read_lines(path)
+    about = {"hazard_curve_sha256": digest}
     named = next((line for line in lines if line.strip() and not line.startswith("#")), "")
     if _POE.search(named):
         return _openquake_curve(path, lines, g, site, about)
