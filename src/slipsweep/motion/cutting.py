@@ -42,34 +42,32 @@ Derivative = Callable[[Exact, int], Exact]
 
 
 @functools.lru_cache
-def _period(waveform: Waveform) -> tuple[Sequence[float], Sequence[Derivative], int]:
+def _period(waveform: Waveform) -> tuple[Sequence[float], Sequence[Derivative], int, bool]:
     """Where a cycle without ramps breaks, what gives the derivatives of w behind each break, the fastest multiple.
 
-    Places are parts of the cycle, derivatives are by phase in radians; the multiple is 0 where w is straight.
+    Places are parts of the cycle, derivatives are by phase in radians; the multiple is 0 where w is straight.  Last,
+    whether w is a sine of whatever phase, whose pieces have closed forms.
     """
     quarters = (0.0, 0.25, 0.5, 0.75, 1.0)
     if waveform.name == "triangle":
-        return quarters, [*map(_line, quarters, (0, 1, 0, -1), (4, -4, -4, 4))], 0
+        return quarters, [*map(_line, quarters, (0, 1, 0, -1), (4, -4, -4, 4))], 0, False
     if waveform.name == "square":
-        return (0.0, 0.5, 1.0), [_line(0.0, 1.0, 0.0), _line(0.5, -1.0, 0.0)], 0
+        return (0.0, 0.5, 1.0), [_line(0.0, 1.0, 0.0), _line(0.5, -1.0, 0.0)], 0, False
     if not isinstance(waveform, Harmonics):
-        return quarters, [_sum_of_sines([1.0], [1], [90.0 if waveform.name == "cosine" else 0.0])] * 4, 1
+        return quarters, [_sum_of_sines([1.0], [1], [90.0 if waveform.name == "cosine" else 0.0])] * 4, 1, True
     assert waveform.phases is not None
     fastest = max(waveform.multiples)
     wave = _sum_of_sines(waveform.amplitudes, waveform.multiples, waveform.phases)
     turns = _sign_changes(wave, 1, _edges(0.0, 1.0, fastest))
     peak = np.abs(wave(np.array([0.0, *turns]), 0)).max()
-    return (0.0, 1.0), [lambda u, order: wave(u, order) / peak], fastest
+    present = [m for a, m in zip(waveform.amplitudes, waveform.multiples, strict=True) if a]
+    return (0.0, 1.0), [lambda u, order: wave(u, order) / peak], fastest, present == [1]
 
 
 def _line(start: float, first: float, slope: float) -> Derivative:
     """A straight line from a place on, its slope by cycle."""
-
-    def derivative(u: Exact, order: int) -> Exact:
-        u = np.asarray(u, _Extended)
-        return first + slope * (u - start) if order == 0 else np.full(u.shape, slope / _TURN if order == 1 else 0)
-
-    return derivative
+    line = np.polynomial.Polynomial(np.array([first, slope], _Extended))
+    return lambda u, order: line.deriv(max(order, 0))(u - _Extended(start)) / _TURN ** max(order, 0)
 
 
 def _sum_of_sines(amplitudes: Sequence[float], multiples: Sequence[int], phases: Sequence[float]) -> Derivative:
@@ -114,7 +112,7 @@ def _sign_changes(derivative: Derivative, order: int, edges: Exact, depth: int =
 
 def _pieces(waveform: Waveform, n: int) -> tuple[Exact, ...]:
     """The pieces of cycle n, as `_monotone_pieces` gives them."""
-    breaks, derivatives, fastest = _period(waveform.plain)
+    breaks, derivatives, fastest, _ = _period(waveform.plain)
     rise, fall, left = _Extended(waveform.ramp_in), _Extended(waveform.ramp_out), waveform.cycles - n
     places = [*breaks]
     for place in (float(rise - n), float(left - fall)):
@@ -160,14 +158,15 @@ def _monotone_pieces(derivative: Derivative, fastest: int, low: float, high: flo
     values[np.abs(values) < _ROUNDING] = 0.0
     at_end = np.abs(values[1:]) > np.abs(values[:-1])
     coefficients = np.where(at_end, series[1:, 1:], series[1:, :-1]).T.astype(np.float64)
-    return places[:-1], places[1:], values[:-1], values[1:], at_end, coefficients
+    return places[:-1], places[1:], values[:-1], values[1:], coefficients
 
 
 @functools.lru_cache(maxsize=32)
 def wave_of(waveform: Waveform) -> Wave:
     """The table of pieces of a waveform."""
+    *_, is_sine = _period(waveform.plain)
     cycles, plain = waveform.cycles, _pieces(waveform.plain, 0)
-    _, _, first, last, *_ = plain
+    _, _, first, last, _ = plain
     wraps = int(first[0] > 0.0 and last[-1] > 0.0)
     # an interval that runs over from one cycle to the next makes the first cycle differ from the others
     lead = min(math.ceil(waveform.ramp_in) + wraps, cycles)
@@ -179,7 +178,7 @@ def wave_of(waveform: Waveform) -> Wave:
     rows = [_pieces(waveform, n) if own else plain for n, own in zip(numbers, ramped, strict=True)]
 
     counts = [len(row[0]) for row in rows]
-    start, end, first, last, at_end, coefficients = map(np.concatenate, zip(*rows, strict=True))
+    start, end, first, last, coefficients = map(np.concatenate, zip(*rows, strict=True))
     before = np.concatenate([[0.0], last[:-1]])
     cycle = 2.0 * math.pi * np.repeat(np.arange(len(rows)), counts)
     table = pieces_of(
@@ -188,19 +187,11 @@ def wave_of(waveform: Waveform) -> Wave:
         length=2.0 * math.pi * (end - start),
         first=np.where(np.abs(first - before) < _ROUNDING, before, first),  # two cycles' roundings are no jump
         last=last,
-        at_end=at_end,
         coefficients=coefficients,
-        arc=np.repeat([_is_sine(waveform) and not own for own in ramped], counts),
+        arc=np.repeat([is_sine and not own for own in ramped], counts),
     )
     shape = [1 + n if own else 0 for n, own in enumerate(ramped)]
     return wave_of_pieces(table, np.cumsum([0, *counts]), shape, lead, repeats)._replace(rises=_rises(table))
-
-
-def _is_sine(waveform: Waveform) -> bool:
-    """Whether a waveform is a sine of whatever phase, whose pieces have closed forms."""
-    if isinstance(waveform, Harmonics):
-        return [m for a, m in zip(waveform.amplitudes, waveform.multiples, strict=True) if a != 0.0] == [1]
-    return waveform.name in ("sine", "cosine")
 
 
 def _rises(pieces: np.ndarray) -> NDArray[np.float64]:
@@ -236,7 +227,6 @@ def wave_of_record(record: Record, polarity: float) -> Wave:
         length=length,
         first=first,
         last=last,
-        at_end=np.abs(last) > np.abs(first),
         coefficients=np.where(first == last, 0.0, (change / spacing)[own])[:, np.newaxis],
     )
     return wave_of_pieces(pieces, cycle=[0, own.size], shape=[0])  # each pulse of a record has its own rises

@@ -38,14 +38,14 @@ class Wave(NamedTuple):
 
 def pieces_of(
     start: NDArray[Any], end: NDArray[Any], length: NDArray[Any], first: NDArray[Any], last: NDArray[Any],
-    at_end: NDArray[Any], coefficients: NDArray[Any], arc: NDArray[Any] | bool = False,
+    coefficients: NDArray[Any], arc: NDArray[Any] | bool = False,
 ) -> np.ndarray:  # fmt: skip
     """The table of pieces.  On one of them w = top + c₁τ + c₂τ² + …, τ from its anchor, its end where |w| is larger.
 
-    `length` is without the rounding of `start` and `end`, `at_end` is where the anchor is, and `arc` whether a piece
-    may be one.
+    `length` is without the rounding of `start` and `end`, and `arc` whether a piece may be one.
     """
-    power, top = np.arange(1, coefficients.shape[1] + 1, dtype=np.int64), np.where(at_end, last, first)
+    power, at_end = np.arange(1, coefficients.shape[1] + 1, dtype=np.int64), np.abs(last) > np.abs(first)
+    top = np.where(at_end, last, first)
     fields: dict[str, NDArray[Any]] = {
         "start": start,  # phases of the motion
         "end": end,
@@ -63,10 +63,7 @@ def pieces_of(
         "twice": coefficients / ((power + 1) * (power + 2)),
     }
     types = [(name, values.dtype, values.shape[1:]) for name, values in fields.items()]
-    pieces = np.zeros(first.size, np.dtype((np.record, types), align=True))
-    for name, values in fields.items():
-        pieces[name] = values
-    return pieces
+    return np.rec.fromarrays(list(fields.values()), np.dtype((np.record, types))).view(np.ndarray)
 
 
 def wave_of_pieces(pieces: np.ndarray, cycle: ArrayLike, shape: ArrayLike, lead: int = 0, repeats: int = 0) -> Wave:
@@ -82,7 +79,7 @@ def wave_of_pieces(pieces: np.ndarray, cycle: ArrayLike, shape: ArrayLike, lead:
         cycle=np.asarray(cycle, np.int64),
         shape=np.asarray(shape, np.int64),
         interval=interval,
-        height=np.maximum.reduceat(np.append(top, 0.0), interval.ravel())[::2].copy() if interval.size else np.empty(0),
+        height=np.maximum.reduceat(np.append(top, 0.0), interval.ravel())[::2].copy(),
         rises=np.empty((0, 2)),
         highest=float(top.max()),
         lowest=float(np.minimum(first, last).min()),
