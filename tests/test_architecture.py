@@ -21,13 +21,13 @@ ORDER = (
 LINES = {
     "jit": 315,
     "model": 1_365,
-    "motion": 1_945,
+    "motion": 1_895,
     "kernels": 3_150,
     "grid": 1_050,
     "studies": 3_885,
-    "files": 2_000,
+    "files": 1_870,
     "charts": 2_475,
-    "explore": 735,
+    "explore": 665,
     "cli": 1_355,
 }
 
