@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -28,9 +29,9 @@ _UNSOUND: Look = _CAUTION | {"color": "0.55", "linestyle": (0, (0.15, 0.35)), "z
 
 #: What an engineer has to choose from in `spread`, what is given for it, and how it is drawn: the end of sliding, and
 #: the friction decay, also as the paper measured it on its shaking table, 2.30 and 2.70 (Table 2).
-_ENDS: dict[str, tuple[str, Look]] = {
-    "Eq. 12": ("eq12", {"color": style.BLUE, "markerfacecolor": style.BLUE}),
-    "integration": ("integrate", {"color": style.VERMILION, "markerfacecolor": "white"}),
+_ENDS: dict[Any, tuple[str, Look]] = {
+    "eq12": ("Eq. 12", {"color": style.BLUE, "markerfacecolor": style.BLUE}),
+    "integrate": ("integration", {"color": style.VERMILION, "markerfacecolor": "white"}),
 }
 _DECAYS: dict[str, tuple[dict[str, Any], Look]] = {
     "λ by Eq. 6": ({"decay_rate": None}, {"linestyle": (0, (7, 2)), "marker": "o"}),
@@ -87,18 +88,17 @@ def _drawn(sheet: Sheet, name: str, scaled: bool = False) -> Figure:
         sheet.data["over_yield"] = divisor / sheet.data["yield_line"]
     for one in {"drawn", "newmark"} & {*sheet.data}:
         sheet.data[one] = sheet.data[one] * factor / divisor
-    every = [_curves(panel, panel.data["drawn"]) for panel in sheet.panels]
     # the paper's axis of A/Üy begins at the yield acceleration
-    values = np.concatenate([ys[xs > 1] if scaled else ys for curves in every for xs, ys in curves])
-    for panel, curves in zip(sheet.panels, every, strict=True):
+    values = sheet.data["drawn"].where(sheet.data["over_yield"] > 1 if scaled else True).values
+    for panel in sheet.panels:
         log_axis(panel.axes, values, label, least)
+        curves = _curves(panel, panel.data["drawn"])
         looks = curve_looks(len(curves)) if panel.y else [{"color": style.BLUE, "linestyle": "-", "marker": ""}]
         for member, (curve, look) in enumerate(zip(curves, looks, strict=True)):
             _draw(sheet, panel, curve, member, len(curves), look)
         _underlay(sheet, panel)
-        theirs = _curves(panel, panel.data["newmark"], gaps=False) if "newmark" in sheet.data else []
-        for curve, look in zip(theirs, looks, strict=False):
-            _draw_newmark(sheet, panel, curve, look)
+        if "newmark" in sheet.data:
+            _draw_newmark(sheet, panel, looks)
         if scaled:
             panel.axes.set(xscale="log", xlabel="peak ground acceleration over yield, A / Üy")
             log_ticks(panel.axes.xaxis, 10)
@@ -117,20 +117,24 @@ def spread(result: Result, options: style.Options) -> Figure:
     # the others have a mode limit, whatever this one is
     sheet.show(solved.DISPLACEMENT, "Barred, of this result", always=True)
     sheet.data["drawn"] = sheet.data["drawn"] * 1000.0
-    flags: list[xr.DataArray] = []
-    answers = [_answers(sheet, panel, flags) for panel in sheet.panels]
-    values = np.concatenate([ys for one in answers for (_, ys), _ in one.values()])
-    for panel, curves in zip(sheet.panels, answers, strict=True):
-        log_axis(panel.axes, values, "permanent displacement (mm)")
-        xs = next(xs for (xs, _), _ in curves.values())
-        each = np.array([ys for (_, ys), _ in curves.values()])
+    own, looks, flags = MODELS.from_attributes(sheet.data.attrs), {}, []
+    for text, model, changed, look in _alternatives(own):
+        answer = solved.solve(sheet.data, [solved.DISPLACEMENT, "validity"], model, **changed).reset_coords(drop=True)
+        sheet.data[text] = solved.reliable(answer, solved.DISPLACEMENT, options.show_cautions) * 1000.0
+        looks[text] = {"linewidth": 1.0, "markersize": 3.5, **look}
+        flags.append(answer["validity"])
+    text = f"this result:\n{_own_text(own, sheet.data)}"
+    sheet.data[text], looks[text] = sheet.data["drawn"], {"color": "black", "linewidth": 2.4, "zorder": 2.5}
+    for panel in sheet.panels:
+        log_axis(panel.axes, sheet.data[[*looks]].to_array().values, "permanent displacement (mm)")
+        curves = [_curves(panel, panel.data[text])[0] for text in looks]
+        xs, each = curves[0][0], np.array([ys for _, ys in curves])
         # what is zero lies below any logarithmic axis, not nowhere
         low, high = (np.maximum(most(each, axis=0), 1e-300) for most in (np.fmin.reduce, np.fmax.reduce))
         area: Look = {"facecolor": "0.92", "linewidth": 0, "zorder": 1, "gid": "spread"}
         sheet.legend["range of these results"] = panel.axes.fill_between(xs, low, high, **area)
-        for number, (text, (curve, look)) in enumerate(curves.items()):
-            place = number / len(curves)
-            sheet.legend[text] = plot_curve(panel.axes, *_above_zero(curve), place, label=text, **look)
+        for number, (ys, (text, look)) in enumerate(zip(each, looks.items(), strict=True)):
+            sheet.legend[text] = plot_curve(panel.axes, xs, ys, number / len(each), label=text, **look)
         _underlay(sheet, panel)
         _mark_accelerations(sheet, panel)
     sheet.note_left_out(solved.DISPLACEMENT, *flags)
@@ -138,27 +142,21 @@ def spread(result: Result, options: style.Options) -> Figure:
     return sheet.done()
 
 
-def _answers(sheet: Sheet, panel: Panel, flags: list[xr.DataArray]) -> dict[str, tuple[Curve, Look]]:
-    """The curves of a spread, mm, over the same abscissae, and their looks, the result's own last; adds to `flags`."""
-    data, own = panel.data, MODELS.from_attributes(panel.data.attrs)
-    ours = own if isinstance(own, Mendez) else Mendez(g=panel.g)
-    newmark: Look = {"color": "0.35", "linestyle": "-", "marker": "x"}
-    options: dict[str, tuple[Model, dict[str, Any], Look]] = {style.NEWMARK: (Newmark(g=panel.g), {}, newmark)}
-    for (end, (recoupling, colours)), (decay, (changed, dash)) in itertools.product(_ENDS.items(), _DECAYS.items()):
-        options[f"{decay}, stop by {end}"] = replace(ours, recoupling=recoupling), changed, colours | dash
-    found = {}
-    for text, (model, changed, look) in options.items():
-        answer = solved.solve(data, [solved.DISPLACEMENT, "validity"], model, **changed)
-        flags.append(answer["validity"])
-        drawn = solved.reliable(answer, solved.DISPLACEMENT, panel.options.show_cautions) * 1000.0
-        found[text] = _curves(panel, drawn)[0], {"linewidth": 1.0, "markersize": 3.5, **look}
-    text = style.NEWMARK
-    if own is ours:
-        given = sheet.data.coords.get("decay_rate")
-        decay = "λ by Eq. 6" if given is None else f"λ = {given.item():.3g}" if given.size == 1 else "λ as given"
-        text = f"{decay}, stop by {'Eq. 12' if own.options['recoupling'] == 'eq12' else 'integration'}"
-    heavy: Look = {"color": "black", "linewidth": 2.4, "zorder": 2.5}
-    return {**found, f"this result:\n{text}": (_curves(panel, data["drawn"])[0], heavy)}
+def _alternatives(own: Model) -> Iterator[tuple[str, Model, dict[str, Any], Look]]:
+    """What may be computed in place of a result: its name in the legend, model, changed parameters, and look."""
+    yield style.NEWMARK, Newmark(g=own.g), {}, {"color": "0.35", "linestyle": "-", "marker": "x"}
+    ours = own if isinstance(own, Mendez) else Mendez(g=own.g)
+    for (recoupling, (end, colours)), (decay, (changed, dash)) in itertools.product(_ENDS.items(), _DECAYS.items()):
+        yield f"{decay}, stop by {end}", replace(ours, recoupling=recoupling), changed, colours | dash
+
+
+def _own_text(own: Model, data: xr.Dataset) -> str:
+    """What the options of a result are called."""
+    if not isinstance(own, Mendez):
+        return style.NEWMARK
+    given = data.coords.get("decay_rate")
+    decay = "λ by Eq. 6" if given is None else f"λ = {given.item():.3g}" if given.size == 1 else "λ as given"
+    return f"{decay}, stop by {_ENDS[own.recoupling][0]}"
 
 
 def _curves(panel: Panel, array: xr.DataArray, gaps: bool = True) -> list[Curve]:
@@ -173,30 +171,26 @@ def _curves(panel: Panel, array: xr.DataArray, gaps: bool = True) -> list[Curve]
     return [(np.insert(xs, at, xs[at]), np.insert(ys, at, np.nan)) for (xs, ys), at in zip(curves, jumps, strict=True)]
 
 
-def _above_zero(curve: Curve) -> Curve:
-    """What a logarithmic axis can show of a curve."""
-    return curve[0], np.where(curve[1] > 0, curve[1], np.nan)
-
-
 def _draw(sheet: Sheet, panel: Panel, curve: Curve, member: int, members: int, look: Look) -> None:
     """Draw a curve of a family, its jumps as dotted lines."""
-    xs, ys = _above_zero(curve)
+    xs, ys = curve
     text = panel.member(member) or (style.NEWMARK if solved.is_newmark(panel.data) else "this result")
     sheet.legend[text] = plot_curve(panel.axes, xs, ys, member / members, label=text, **look)
     for at in np.flatnonzero(np.isnan(ys[1:-1]) & (xs[1:-1] == xs[2:])) + 1:
         ends = [at - 1, at + 1]
-        if np.isfinite(ys[ends]).all():
+        if (ys[ends] > 0).all():
             panel.axes.plot(xs[ends], ys[ends], color=look["color"], gid="jump", **_JUMP)
             sheet.remarks["jump at the mode limit"] = Line2D([], [], color="0.3", **_JUMP)
 
 
-def _draw_newmark(sheet: Sheet, panel: Panel, curve: Curve, look: Look) -> None:
-    """Draw Newmark's curve: thin, with the dash of its curve of a family; dashed where there is one curve."""
+def _draw_newmark(sheet: Sheet, panel: Panel, looks: list[Look]) -> None:
+    """Draw Newmark's curves: thin, with the dashes of a family; dashed where there is one curve."""
     single: Look = {"linestyle": (0, (5, 2)), "linewidth": 1.4, "color": "0.3"}
-    own = _NEWMARK | ({"linestyle": look["linestyle"]} if panel.y else single)
-    panel.axes.plot(*_above_zero(curve), gid="newmark", **own)
+    for (xs, ys), look in zip(_curves(panel, panel.data["newmark"], gaps=False), looks, strict=True):
+        own = _NEWMARK | ({"linestyle": look["linestyle"]} if panel.y else single)
+        panel.axes.plot(xs, np.where(ys > 0, ys, np.nan), gid="newmark", **own)
     text = f"{style.NEWMARK} (same dash)" if panel.y else style.NEWMARK
-    sheet.remarks[text] = Line2D([], [], **(_NEWMARK if panel.y else own))
+    sheet.remarks[text] = Line2D([], [], **_NEWMARK | ({} if panel.y else single))
 
 
 def _underlay(sheet: Sheet, panel: Panel) -> None:
@@ -220,8 +214,8 @@ def _mark_accelerations(sheet: Sheet, panel: Panel) -> None:
     """Vertical lines where the amplitude passes a threshold that all curves of a panel share."""
     (low, high), data = panel.axes.get_xlim(), panel.data
     if panel.x in ("yield_coefficient", "yield_acceleration") and "amplitude" in data and not solved.is_recorded(data):
-        place = data["amplitude"].values.max() / (panel.g if panel.x == "yield_coefficient" else 1.0)
-        place *= panel.options.scale(panel.x, panel.g)
+        scale = 1 / panel.g if panel.x == "yield_coefficient" else panel.options.scale(panel.x, panel.g)
+        place = data["amplitude"].values.max() * scale
         if low < place < high and data["amplitude"].size == 1:
             look: Look = {"facecolor": "none", "edgecolor": "0.7", "hatch": ".."}
             panel.axes.axvspan(place, high, linewidth=0, zorder=0.5, **look)

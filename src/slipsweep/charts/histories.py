@@ -1,7 +1,7 @@
 """Figures over time: the history of a block, measured friction, measured against computed motion."""
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,9 @@ _ABOVE: Look = {"loc": "lower right", "bbox_to_anchor": (1, 1), "frameon": False
 
 _GREY = "0.45"
 
+#: What is on the ordinates of accelerations and, below them, of friction.
+_LABELS = ("acceleration\n(m/s²)", "friction\ncoefficient")
+
 #: Of each channel of the block: label, factor to the unit drawn, and this unit.
 _CHANNELS = {
     "block_acceleration": ("acceleration of\nthe block (m/s²)", 1.0, "m/s²"),
@@ -37,18 +40,20 @@ _CHANNELS = {
 }
 
 
-def _plot(panel: Axes, table: xr.Dataset, name: str, ylabel: str, factor: float = 1.0, **look: Any) -> None:
+def _plot(panel: Axes, table: xr.Dataset, name: str, factor: float = 1.0, **look: Any) -> None:
     panel.plot(table["time"].values, factor * table[name].values, **{"color": VERMILION, **look})
-    panel.set_ylabel(ylabel)
 
 
-def _finish(drawing: Drawing, panels: Iterable[Axes], texts: list[str]) -> Figure:
-    """A line at zero and a grid in the panels, the time below the last ones, and a caption."""
-    for panel in panels:
-        panel.axhline(0, color="0.6", linewidth=0.8, zorder=0)
-        panel.margins(x=0)
-        panel.grid(color="0.9")
-        panel.set_xlabel("time (s)" if panel in drawing.grid[-1] else "")
+def _finish(drawing: Drawing, labels: Sequence[str], texts: list[str]) -> Figure:
+    """Labels of the last rows of panels, a line at zero and a grid in them, the time below, and a caption."""
+    for panels, label in zip(drawing.grid[-len(labels) :], labels, strict=True):
+        panels[0].set_ylabel(label)
+        for panel in panels:
+            panel.axhline(0, color="0.6", linewidth=0.8, zorder=0)
+            panel.margins(x=0)
+            panel.grid(color="0.9")
+    for panel in drawing.grid[-1]:
+        panel.set_xlabel("time (s)")
     drawing.figure.align_ylabels()
     return drawing.finish(texts)
 
@@ -59,11 +64,9 @@ def history(result: Result, options: Options) -> Figure:
     modes, friction = "half_wave_mode" in data, "friction_coefficient" in data
     heights = [0.22] * modes + [1.0] * (3 + friction)
     drawing = Drawing(options, len(heights), 1, (7.0, 7.0 + 0.5 * modes), sharey=False, height_ratios=heights)
-    panels = list(drawing.grid.ravel()[modes:])
-    accelerations, *_, velocity, displacement = panels
-    label = "acceleration\n(m/s²)"
-    _plot(accelerations, data, "ground_acceleration", label, color=BLUE, label="base")
-    _plot(accelerations, data, "block_acceleration", label, linestyle="--", label="block")
+    accelerations, *coefficient, velocity, displacement = drawing.grid.ravel()[modes:]
+    _plot(accelerations, data, "ground_acceleration", color=BLUE, label="base")
+    _plot(accelerations, data, "block_acceleration", linestyle="--", label="block")
     if modes:
         _draw_modes(drawing.grid[0, 0], data)
         highest = data["half_wave_peak"].values.max(initial=0.0)
@@ -72,12 +75,13 @@ def history(result: Result, options: Options) -> Figure:
                 text, look = style.LINES[str(name)]
                 accelerations.axhline(value.item(), label=text, gid=name, **{**look, "linewidth": 0.9, "zorder": 1.5})
     accelerations.legend(fontsize="small", **_ABOVE)
-    if friction:
-        _plot(panels[1], data, "friction_coefficient", "friction\ncoefficient")
-    _plot(velocity, data, "relative_velocity", "relative\nvelocity (m/s)")
+    for panel in coefficient:
+        _plot(panel, data, "friction_coefficient")
+    _plot(velocity, data, "relative_velocity")
     factor, unit = (1.0, "m") if (np.abs(data["relative_displacement"]) >= 1.0).any() else (1000.0, "mm")
-    _plot(displacement, data, "relative_displacement", f"relative\ndisplacement ({unit})", factor)
-    return _finish(drawing, panels, [style.caption(data, options)])
+    _plot(displacement, data, "relative_displacement", factor)
+    labels = [*_LABELS[: 1 + friction], "relative\nvelocity (m/s)", f"relative\ndisplacement ({unit})"]
+    return _finish(drawing, labels, [style.caption(data, options)])
 
 
 def _draw_modes(panel: Axes, data: xr.Dataset) -> None:
@@ -103,9 +107,8 @@ def friction(result: Result, options: Options) -> Figure:
     table = result.data
     drawing = Drawing(options, 2, 1, (7.0, 4.8), sharey=False)
     accelerations, coefficient = drawing.grid.ravel()
-    label = "acceleration\n(m/s²)"
-    _plot(accelerations, table, "ground_acceleration", label, color=BLUE, label="table")
-    _plot(accelerations, table, "block_acceleration", label, linewidth=1.0, label="block")
+    _plot(accelerations, table, "ground_acceleration", color=BLUE, label="table")
+    _plot(accelerations, table, "block_acceleration", linewidth=1.0, label="block")
     accelerations.legend(**_ABOVE)
     _friction_lines(table, coefficient)
     coefficient.axhline(table["mu_s"].item(), color=_GREY, linewidth=0.8, linestyle="--", label="μs")
@@ -114,51 +117,45 @@ def friction(result: Result, options: Options) -> Figure:
     for panel, span in itertools.product(drawing.grid.ravel(), zip(table["slide_onset"].values, stops, strict=True)):
         panel.axvspan(*span, color="0.92", zorder=0)
     shaded = f"shaded: slides, relative acceleration beyond {table.attrs['threshold']:.3g} m/s²"
-    texts = [table.attrs["constant_friction"], f"{_given(table)}; {shaded}"]
-    return _finish(drawing, drawing.grid.ravel(), texts)
+    return _finish(drawing, _LABELS, [table.attrs["constant_friction"], f"{_given(table)}; {shaded}"])
 
 
 def calibration(result: Result, options: Options) -> Figure:
     """Measured against computed motion in the manner of the paper's Figs. 8 and 9, a column for each test."""
     table = result.data
     tests = [table.isel(test=i) for i in range(table.sizes["test"])] if "test" in table.dims else [table]
-    rows = 5 if "free_body_friction" in table else 4
+    labels = ["acceleration of\nthe table (m/s²)", *(label for label, *_ in _CHANNELS.values())]
+    labels += _LABELS[1:] if "free_body_friction" in table else ()
     width = 7.0 if len(tests) == 1 else 5.0 * len(tests)
-    drawing = Drawing(options, rows, len(tests), (width, 9.0), sharey=False)
+    drawing = Drawing(options, len(labels), len(tests), (width, 9.0), sharey=False)
     for test, panels in zip(tests, drawing.grid.T, strict=True):
-        shown = test.isel({test["time"].dims[0]: test["computed_ground_acceleration"].notnull().values})
-        _draw_test(shown, list(panels))
-    for panel in drawing.grid[:, 1:].ravel():
-        panel.set_ylabel("")
-    return _finish(drawing, drawing.grid.ravel(), [table.attrs["constant_friction"], _parameters(table)])
+        _draw_test(test.isel({test["time"].dims[0]: test["computed_ground_acceleration"].notnull().values}), panels)
+    return _finish(drawing, labels, [table.attrs["constant_friction"], _parameters(table)])
 
 
-def _draw_test(table: xr.Dataset, panels: list[Axes]) -> None:
-    ground, label = panels[0], "acceleration of\nthe table (m/s²)"
+def _draw_test(table: xr.Dataset, panels: Sequence[Axes]) -> None:
     measured: Look = {"color": _GREY, "marker": ".", "linestyle": "", "markersize": 2, "label": "measured"}
-    _plot(ground, table, "measured_ground_acceleration", label, **measured)
-    _plot(ground, table, "computed_ground_acceleration", label, color=BLUE, label="smooth")
-    ground.legend(**_ABOVE)
-    for panel, (name, (label, factor, unit)) in zip(panels[1:4], _CHANNELS.items(), strict=True):
+    _plot(panels[0], table, "measured_ground_acceleration", **measured)
+    _plot(panels[0], table, "computed_ground_acceleration", color=BLUE, label="smooth")
+    for panel, (name, (_, factor, unit)) in zip(panels[1:4], _CHANNELS.items(), strict=True):
         text = "not measured"
         if f"misfit_{name}" in table and bool(table[f"misfit_{name}"].notnull()):
-            _plot(panel, table, f"measured_{name}", label, factor, **measured)
+            _plot(panel, table, f"measured_{name}", factor, **measured)
             misfit, share = factor * table[f"misfit_{name}"].item(), table[f"relative_misfit_{name}"].item()
             text = f"misfit {misfit:.2g} {unit} ({share:.1%})"
-        _plot(panel, table, f"computed_{name}", label, factor, linewidth=1.2, label="computed")
+        _plot(panel, table, f"computed_{name}", factor, linewidth=1.2, label="computed")
         panel.set_title(text, fontsize="small", loc="left")
-    panels[1].legend(**_ABOVE)
-    if len(panels) > 4:
-        _friction_lines(table, panels[4])
-        panels[4].legend(**_ABOVE)
+    for panel in panels[4:]:
+        _friction_lines(table, panel)
+    for panel in (*panels[:2], *panels[4:]):
+        panel.legend(**_ABOVE)
 
 
 def _friction_lines(table: xr.Dataset, panel: Axes) -> None:
     """Friction by Eq. 1 and by statics; told apart in grey by their widths and dashes."""
-    label = "friction\ncoefficient"
     dashed: Look = {"linewidth": 1.0, "linestyle": (0, (4, 1.5))}
-    _plot(panel, table, "free_body_friction", label, color=BLUE, linewidth=1.6, label="by statics")
-    _plot(panel, table, "friction_coefficient", label, label="μ(t) by Eq. 1", **dashed)
+    _plot(panel, table, "free_body_friction", color=BLUE, linewidth=1.6, label="by statics")
+    _plot(panel, table, "friction_coefficient", label="μ(t) by Eq. 1", **dashed)
 
 
 def _given(table: xr.Dataset) -> str:

@@ -80,8 +80,6 @@ def contours(result: Result, options: Options) -> Figure:
         why = "all values are about the same" if (drawn > 0).any() else "no values above zero"
         sheet.notes.append(f"No contours: {why}.")
         return _finish(sheet, name)
-    colours = style.COLOURS.resampled(len(levels) + 1)
-    norm = BoundaryNorm(np.log10(levels), colours.N, extend="min" if np.nanmax(drawn) < levels[-1] else "both")
     logs = xr.apply_ufunc(np.log10, drawn.clip(min=levels[0]))
     growth = [logs.diff(dim) for dim in (sheet.x, str(sheet.y))]
     if any((abs(one) > 1.0).sum() > _COARSE * (one != 0.0).sum() for one in growth):
@@ -90,7 +88,8 @@ def contours(result: Result, options: Options) -> Figure:
     texts = [style.length_text(one) if of_length else style.with_unit(f"{one:.3g}", style.unit(name)) for one in levels]
     # what is below the lowest level, or nothing, is a hundredth of it; what does not slide is covered later
     sheet.data["drawn"] = drawn.clip(min=levels[0] / 100)
-    _fill_panels(sheet, colours, norm, texts, RESULTS[name]["long_name"])
+    colours, end = style.COLOURS.resampled(len(levels) + 1), "min" if drawn.max() < levels[-1] else "both"
+    _fill_panels(sheet, colours, levels, texts, RESULTS[name]["long_name"], end)
     return _finish(sheet, name)
 
 
@@ -108,10 +107,9 @@ def newmark(result: Result, options: Options) -> Figure:
     farthest = float(np.abs(np.log10(there)).max())
     above = [level for level in _RATIOS if level == _RATIOS[0] or math.log10(level) < farthest]
     levels = [1 / level for level in reversed(above)] + above
-    colours = style.ratio_colours(len(above))
-    norm = BoundaryNorm(np.log10(levels), colours.N, extend="both")
     texts = [f"{level:.2g}" if level < 1 else f"{level:g}" for level in levels]
-    _fill_panels(sheet, colours, norm, texts, "displacement over that of Newmark's block")
+    label = "displacement over that of Newmark's block"
+    _fill_panels(sheet, style.ratio_colours(len(above)), levels, texts, label, "both")
     return _finish(sheet, DISPLACEMENT)
 
 
@@ -144,10 +142,10 @@ def _excess(panel: Panel, line: str) -> Any:
     return np.ma.masked_invalid(panel.grid("amplitude") - (panel.grid(line) if line in panel.data else np.nan))
 
 
-def _fill_panels(sheet: Sheet, colours: Colormap, norm: BoundaryNorm, texts: list[str], label: str) -> None:
+def _fill_panels(sheet: Sheet, colours: Colormap, levels: list[float], texts: list[str], label: str, end: Any) -> None:
     """Fill between contours and label them, up to the jump at the mode limit."""
-    places, areas = norm.boundaries, None
-    look: Look = {"cmap": colours, "norm": norm}
+    places, areas = np.log10(levels), None
+    look: Look = {"cmap": colours, "norm": BoundaryNorm(places, colours.N, extend=end)}
     line: Look = {"colors": "black", "linewidths": 0.7, "linestyles": "solid", "zorder": 1}
     for panel in sheet.panels:
         xs, ys = panel.xs, panel.ys
@@ -160,7 +158,7 @@ def _fill_panels(sheet: Sheet, colours: Colormap, norm: BoundaryNorm, texts: lis
         for side in (~beyond, beyond):  # no contour crosses the jump
             shown = np.ma.masked_invalid(np.where(side, logs, np.nan))
             if shown.count():
-                areas = panel.axes.contourf(xs, ys, shown, places, zorder=0.5, extend=norm.extend, **look)
+                areas = panel.axes.contourf(xs, ys, shown, places, zorder=0.5, extend=end, **look)
                 lines = panel.axes.contour(xs, ys, shown, places, **line)
                 lines.set_gid("contours")
                 _label_contours(panel, lines, dict(zip(places, texts, strict=True)))

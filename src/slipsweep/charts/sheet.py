@@ -117,19 +117,21 @@ def _without_colour(figure: Figure) -> None:
             artist.set_cmap(shades.with_extremes(**{end: style.to_grey(one)[0] for end, one in ends.items()}))
             continue
         for kind in ("color", "markerfacecolor", "markeredgecolor", "facecolor", "edgecolor"):
-            colours: Any = getattr(artist, f"get_{kind}", list)()
-            if len(colours):
-                grey = style.to_grey(colours)
+            grey = style.to_grey(getattr(artist, f"get_{kind}", list)())
+            if len(grey):
                 artist.set(**{kind: grey if len(grey) > 1 else tuple(grey[0])})
 
 
 class Panel:
-    """A part of a sheet's slice and the axes it is drawn in."""
+    """A part of a sheet's slice, `at` a row and column, and the axes it is drawn in."""
 
-    def __init__(self, sheet: "Sheet", axes: Axes, where: dict[str, int]) -> None:
-        self._sheet, self._where = sheet, where
+    def __init__(self, sheet: "Sheet", axes: Axes, at: tuple[int, ...]) -> None:
+        self._sheet, self._where = sheet, dict(zip(sheet.along, at[::-1], strict=False))
         self.axes, self.x, self.y, self.options = axes, sheet.x, sheet.y, sheet.options
         self.g = float(sheet.data.attrs["g"])
+        names = [member_text(sheet.data, dim, index, self.options) for dim, index in self._where.items()]
+        if names:
+            axes.set_title(", ".join(names), fontsize="medium")
         # the values along x and y, in the units that they are drawn in
         self.xs, self.ys = (
             axis_numbers(self.data, name) * self.options.scale(name, self.g) if name else np.zeros(0)
@@ -170,13 +172,7 @@ class Sheet(Drawing):
         size = (_WIDTH, 5.3) if rows == columns == 1 else (max(_WIDTH, 2.0 + 2.7 * columns), 2.0 + 2.5 * rows)
         super().__init__(options, rows, columns, size)
         self.data, self.x, self.y, self.along = data, x, y, along
-        self.panels: list[Panel] = []
-        for (row, column), one in np.ndenumerate(self.grid):
-            where = dict(zip(along, (column, row), strict=False))
-            self.panels.append(Panel(self, one, where))
-            title = ", ".join(member_text(data, dim, at, options) for dim, at in where.items())
-            if title:
-                one.set_title(title, fontsize="medium")
+        self.panels = [Panel(self, axes, at) for at, axes in np.ndenumerate(self.grid)]
 
     def set_axis(self, side: str) -> None:
         """Scale, ticks and label of an axis, and the acceleration in the other unit on the opposite side."""
@@ -187,9 +183,7 @@ class Sheet(Drawing):
             if name not in ("theta", "phi") and is_log(values):
                 axes.set(**{f"{side}scale": "log"})
                 log_ticks(getattr(axes, f"{side}axis"), values[-1] / values[0])
-            place = axes.get_subplotspec()
-            outer = place is None or (place.is_last_col() if side == "y" else place.is_first_row())
-            if style.is_acceleration(name) and (outer or self.options.ax is not None):
+            if style.is_acceleration(name) and axes in (self.grid[:, -1] if side == "y" else self.grid[0]):
                 _second_scale(axes, side, panel.g, self.options.units, style.SYMBOLS[name])
 
     def note_left_out(self, name: str, *others: xr.DataArray) -> None:
@@ -251,8 +245,7 @@ def member_text(data: xr.Dataset, dim: str, index: int, options: Options) -> str
     labels = axis_labels(data, dim)
     if labels:
         return style.plain(labels[index])
-    values = axis_numbers(data, dim) if dim in data.sizes else data[dim].values
-    return style.value_text(data, dim, float(values[index]), options)
+    return style.value_text(data, dim, float(axis_numbers(data, dim)[index]), options)
 
 
 def is_log(values: Floats) -> bool:
@@ -321,8 +314,11 @@ def curve_looks(number: int) -> list[Look]:
 def plot_curve(axes: Axes, xs: Floats, ys: Floats, offset: float = 0.0, **look: Any) -> Any:
     """Draw a line with a few markers, and one on each value that has no neighbour to be joined with.
 
-    `offset` moves the markers by that part of their distance, so that those of several curves lie apart.
+    `offset` moves the markers by that part of their distance, so that those of several curves lie apart.  On a
+    logarithmic axis there is a gap where nothing is above zero.
     """
+    if axes.get_yscale() == "log":
+        ys = np.where(ys > 0, ys, np.nan)
     there = np.concatenate([[False], np.isfinite(ys), [False]])
     single = np.flatnonzero(there[1:-1] & ~there[:-2] & ~there[2:])
     inside = np.flatnonzero(there[1:-1])

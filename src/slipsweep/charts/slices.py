@@ -164,9 +164,9 @@ class Result:
     def spread(self, dim: str, number: int) -> list[Place]:
         """At most `number` places on an axis, from end to end, in even steps if a few less have them."""
         size = self.data.sizes[dim]
-        even = [n for n in (number, number - 1, number - 2) if n > 3 and (size - 1) % (n - 1) == 0]
-        number = even[0] if even and size > number else number
-        return [Place(math.nan, int(i)) for i in np.unique(np.linspace(0, size - 1, min(number, size)).round())]
+        most = min(number, size)
+        number = next((n for n in (most, most - 1, most - 2) if n > 3 and (size - 1) % (n - 1) == 0), most)
+        return [Place(math.nan, int(i)) for i in np.linspace(0, size - 1, number).round()]
 
     def sheet(
         self, options: Options, names: Sequence[str], x: str | Sequence[str], *, y: Sequence[str] = (),

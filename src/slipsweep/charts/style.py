@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import matplotlib as mpl
 import numpy as np
 import xarray as xr
-from matplotlib.colors import LinearSegmentedColormap, ListedColormap, to_rgba
+from matplotlib.colors import LinearSegmentedColormap, ListedColormap, to_rgba_array
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
@@ -145,7 +145,7 @@ def ratio_colours(number: int) -> ListedColormap:
 
 def to_grey(colour: Any) -> Any:
     """A colour, or an array of them, by its lightness alone."""
-    rgba = np.atleast_2d(to_rgba(colour) if isinstance(colour, str | tuple) else colour)
+    rgba = to_rgba_array(colour)
     grey = rgba[:, :3] @ (0.299, 0.587, 0.114)
     return np.column_stack([grey, grey, grey, rgba[:, 3]])
 

@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 from scipy import stats
 
 from slipsweep.charts import solved, statistics, style
@@ -74,18 +73,18 @@ def intensity(result: Result, options: Options) -> Figure:
     factor = [] if "scale" in result.data.coords else ["motion_factor"]
     sheet = _sheet(result, replace(options, x=None), "motion", factor)
     drawn = [_scattered(panel, measure) for panel in sheet.panels]
-    displacements, places = (np.concatenate([one[i] for one in drawn]) for i in (1, 0))
+    places, displacements, _ = np.concatenate(drawn, axis=1)
     there = places[np.isfinite(places) & (places > 0)]
     wide = there.size > 0 and there.max() > 3 * there.min()
     text = INTENSITY_MEASURES[measure]["long_name"].removesuffix(" as recorded")
-    for panel, (xs, ys, negative) in zip(sheet.panels, drawn, strict=True):
+    for panel, (xs, ys, polarity) in zip(sheet.panels, drawn, strict=True):
         log_axis(panel.axes, displacements, _LABEL)
         if wide:
             panel.axes.set_xscale("log")
             log_ticks(panel.axes.xaxis, there.max() / there.min())
         panel.axes.set_xlabel(f"{text} ({style.unit(measure)})")
-        low = panel.axes.get_ylim()[0]
-        marks: dict[str, tuple[NDArray[np.bool_], Floats, Look]] = {
+        low, negative = panel.axes.get_ylim()[0], polarity < 0
+        marks: dict[str, tuple[Any, Floats, Look]] = {
             "polarity 1" if negative.any() else "a motion": (~negative & (ys >= low), ys, _POINT),
             "polarity −1": (negative & (ys >= low), ys, _REVERSED),
             "zero, or below the axis": (ys < low, np.full_like(ys, low * 1.1), _BELOW),
@@ -188,18 +187,16 @@ def _millimetres(data: xr.Dataset) -> Floats:
     return np.asarray(values[np.isfinite(values)], np.float64)
 
 
-def _scattered(panel: Panel, measure: str) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """Intensity as it shakes the block, displacement in mm, and whether the motion is reversed, of all drawn."""
+def _scattered(panel: Panel, measure: str) -> Floats:
+    """Intensity as it shakes the block, displacement in mm, and polarity, in rows, of all that are drawn."""
     data = panel.data
     power, time_power = SCALING[measure]
     factor = np.abs(data["scale"] if "scale" in data.coords else data["motion_factor"])
     time = data["time_scale"] if "time_scale" in data.coords else 1.0
     xs = data[f"motion_{measure}"] * factor**power * time**time_power
     ys = solved.reliable(data, solved.DISPLACEMENT, panel.options.show_cautions) * 1000.0
-    every = xr.broadcast(xs, ys, data["polarity"] < 0)
-    places, heights, reverse = (one.transpose(*every[1].dims).values.ravel() for one in every)
-    there = np.isfinite(heights)
-    return places[there], heights[there], reverse[there]
+    every = np.array([one.values.ravel() for one in xr.broadcast(xs, ys, data["polarity"])])
+    return every[:, np.isfinite(every[1])]
 
 
 def _draw_regression(sheet: Sheet, panel: Panel, xs: Floats, ys: Floats) -> None:
