@@ -1,7 +1,6 @@
 """Curves: a result over one axis of a slice, a curve for each value of another, or for each option of the model."""
 
 import itertools
-import math
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -42,16 +41,15 @@ _DECAYS: dict[str, tuple[dict[str, Any], Look]] = {
 
 def families(result: Result, options: style.Options) -> Figure:
     """Curves of a result over one axis, one for each value of another, with Newmark's of displacements."""
-    first = ("frequency", "yield_coefficient", "mu_s", "theta")
-    name = result.quantity(options.variable)
-    return _drawn(result.sheet(options, result.compared(name), solved.DRIVES, curves=[*first, *result.wide]), name)
+    first = ("frequency", "yield_coefficient", "mu_s", "theta", *result.wide)
+    sheet = result.sheet(options, result.compared(options.variable), solved.DRIVES, curves=first)
+    return _drawn(sheet, options.variable)
 
 
 def curve(result: Result, options: style.Options) -> Figure:
     """One curve of a result over one axis, with Newmark's of a displacement."""
-    name = result.quantity(options.variable)
     first = (*solved.DRIVES, "yield_coefficient", "frequency")
-    return _drawn(result.sheet(options, result.compared(name), first), name)
+    return _drawn(result.sheet(options, result.compared(options.variable), first), options.variable)
 
 
 def motions(result: Result, options: style.Options) -> Figure:
@@ -78,16 +76,15 @@ def dimensionless(result: Result, options: style.Options) -> Figure:
 def _drawn(sheet: Sheet, name: str, scaled: bool = False) -> Figure:
     """Curves of a result, of the displacement with Newmark's; `scaled` as uω²/A over A/Üy."""
     factor: Any = 1000.0 if style.unit(name) == "m" else 1.0
-    divisor: Any = 1.0
     units, least = ("mm", 1.0) if factor > 1 else (sheet.options.unit(name), None)
     label = f"{RESULTS[name]['long_name']} ({units})".removesuffix(" ()")
     sheet.show(name, "Barred curves")
     if scaled:
         label, least = "permanent displacement, u\u00a0ω²\u00a0/\u00a0A", 1e-4
-        factor, divisor = (2 * math.pi * sheet.data["frequency"]) ** 2, sheet.data["amplitude"]
-        sheet.data["over_yield"] = divisor / sheet.data["yield_line"]
+        factor = (2 * np.pi * sheet.data["frequency"]) ** 2 / sheet.data["amplitude"]
+        sheet.data["over_yield"] = sheet.data["amplitude"] / sheet.data["yield_line"]
     for one in {"drawn", "newmark"} & {*sheet.data}:
-        sheet.data[one] = sheet.data[one] * factor / divisor
+        sheet.data[one] = sheet.data[one] * factor
     # the paper's axis of A/Üy begins at the yield acceleration
     values = sheet.data["drawn"].where(sheet.data["over_yield"] > 1 if scaled else True).values
     for panel in sheet.panels:
@@ -100,9 +97,8 @@ def _drawn(sheet: Sheet, name: str, scaled: bool = False) -> Figure:
         if "newmark" in sheet.data:
             _draw_newmark(sheet, panel, looks)
         if scaled:
-            panel.axes.set(xscale="log", xlabel="peak ground acceleration over yield, A / Üy")
+            panel.axes.set(xscale="log", xlim=(1.0, None), xlabel="peak ground acceleration over yield, A / Üy")
             log_ticks(panel.axes.xaxis, 10)
-            panel.axes.set_xlim(left=1.0)
         else:
             _mark_accelerations(sheet, panel)
     sheet.note_left_out(name)

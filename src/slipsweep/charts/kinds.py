@@ -107,8 +107,7 @@ def draw_all(
                 raise
             left_out[kind] = str(error).removeprefix(f"{result.name}: ")
     if not figures:
-        reasons = "; ".join(dict.fromkeys(left_out.values()))
-        raise InputError(f"{result.name}: no chart can be drawn from it: {reasons}")
+        raise InputError(f"{result.name}: no chart can be drawn from it: {'; '.join(dict.fromkeys(left_out.values()))}")
     return figures, left_out
 
 

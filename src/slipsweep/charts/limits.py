@@ -21,12 +21,9 @@ _MOST_CURVES, _MOST_MARKS = 8, 20
 
 
 def limit(result: Result, options: Options) -> Figure:
-    """Limit amplitudes, in g, over one axis: a curve for each value of another; of a suite as `draw_suite`.
-
-    Where nothing but the motion varies, the motions lie along the abscissa.
-    """
+    """Limit amplitudes, in g, over one axis: a curve for each value of another; of a suite as `draw_suite`."""
     suite = SUITE if "motion" in result.dims else ()
-    single = suite and not {*result.wide} - {*SUITE, *options.at}
+    single = suite and not {*result.wide} - {*SUITE, *options.at}  # nothing varies but the motion
     along = "motion" if single else ("frequency", "mu_s", "theta", "displacement")
     curves = None if suite else ("theta", "displacement", "mu_s", "case")
     names, shown = ["limit_amplitude", "limit_status"], replace(options, more_panels=True)

@@ -5,7 +5,6 @@ over a logarithmic frequency axis.
 """
 
 import itertools
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -55,26 +54,17 @@ HATCHES = {
 #: Hatching of displacements that have a trend which no block has.
 UNSOUND_HATCH = "///"
 
-#: Least width and height of a hatched region, inches: a smaller one is a scrap of hatch; the caption counts its cells.
-_SCRAP = 0.09
-
 #: Share of the steps from cell to cell in which values grow more than tenfold, beyond which a grid is coarse.
 _COARSE = 0.1
-
-#: What a contour's label takes to each side, and what it needs to the next line, inches.
-_LABEL_SPACE, _LINE_SPACE = 0.28, 0.11
-
-#: Ratios above one at which the colour changes; below one their inverses do.  The first is as good as one.
-_RATIOS = (1.1, 1.5, 2.0, 3.0, 5.0, 10.0, 30.0, 100.0)
 
 
 def contours(result: Result, options: Options) -> Figure:
     """Contours of a result, with the lines of yield and of the mode limit."""
-    name, levels = result.quantity(options.variable), options.heights
+    names, levels = result.compared(options.variable), options.heights
     if len(levels) == 1:
         raise InputError(f"levels: {levels[0]:g}: must be two different values or more")
-    sheet = _sheet(result, options, result.compared(name), ("frequency", "theta", "mu_s"))
-    drawn = sheet.data["drawn"]
+    sheet = _sheet(result, options, names, ("frequency", "theta", "mu_s"))
+    name, drawn = names[0], sheet.data["drawn"]
     levels = levels or _levels(name, drawn.values)
     if not levels or not np.isfinite(drawn).any():
         why = "all values are about the same" if (drawn > 0).any() else "no values above zero"
@@ -99,13 +89,13 @@ def newmark(result: Result, options: Options) -> Figure:
         raise InputError(f"{result.name}: the result is of Newmark's block itself: the ratio is 1 everywhere")
     sheet = _sheet(result, options, result.compared(DISPLACEMENT), ("theta", "mu_s", "frequency"))
     sheet.data["drawn"] = (sheet.data["drawn"] / sheet.data["newmark"]).where(sheet.data["newmark"] > 0)
-    ratio = sheet.data["drawn"].values
-    there = ratio[np.isfinite(ratio) & (ratio > 0)]
-    if not there.size:
+    there = sheet.data["drawn"].where(sheet.data["drawn"] > 0)
+    if not there.count():
         sheet.notes.append("No ratio: no displacement above zero.")
         return _finish(sheet, DISPLACEMENT)
-    farthest = float(np.abs(np.log10(there)).max())
-    above = [level for level in _RATIOS if level == _RATIOS[0] or math.log10(level) < farthest]
+    farthest = np.abs(np.log10(there)).max()
+    # the colour changes at these and at their inverses; the first is as good as one
+    above = [1.1, *(level for level in (1.5, 2.0, 3.0, 5.0, 10.0, 30.0, 100.0) if np.log10(level) < farthest)]
     levels = [1 / level for level in reversed(above)] + above
     texts = [f"{level:.2g}" if level < 1 else f"{level:g}" for level in levels]
     label = "displacement over that of Newmark's block"
@@ -164,8 +154,7 @@ def _fill_panels(sheet: Sheet, colours: Colormap, levels: list[float], texts: li
                 _label_contours(panel, lines, dict(zip(places, texts, strict=True)))
     if areas is None:
         return
-    axes, names = [panel.axes for panel in sheet.panels], FixedFormatter(texts)
-    bar = sheet.figure.colorbar(areas, ax=axes, ticks=places, format=names, pad=0.02)
+    bar = sheet.figure.colorbar(areas, ax=sheet.grid, ticks=places, format=FixedFormatter(texts), pad=0.02)
     bar.ax.tick_params(labelsize=sheet.options.font)
     bar.minorticks_off()
     bar.set_label(label, fontsize="small" if len(sheet.panels) > 1 else None)
@@ -173,6 +162,7 @@ def _fill_panels(sheet: Sheet, colours: Colormap, levels: list[float], texts: li
 
 def _label_contours(panel: Panel, drawn: Any, texts: dict[float, str]) -> None:
     """Label each contour where it is farthest from the frame and from all other lines, if there is space."""
+    label_space, line_space = 0.28, 0.11  # inches, that a label takes to each side, and that it needs to the next line
     inches = panel.axes.transData + panel.axes.figure.dpi_scale_trans.inverted()
     corners = panel.axes.bbox.transformed(panel.axes.figure.dpi_scale_trans.inverted()).get_points()
     thresholds: list[Any] = [one for one in panel.axes.collections if one.get_gid() in style.LINES]
@@ -182,9 +172,9 @@ def _label_contours(panel: Panel, drawn: Any, texts: dict[float, str]) -> None:
     for at, points in enumerate(lines[: len(drawn.levels)]):
         others = np.concatenate([*lines[:at], *lines[at + 1 :], np.full((1, 2), 1e9)])
         space = np.minimum(points - corners[0], corners[1] - points).min(axis=1)
-        space = np.minimum(space, _LABEL_SPACE / _LINE_SPACE * KDTree(others).query(points)[0])
+        space = np.minimum(space, label_space / line_space * KDTree(others).query(points)[0])
         space = np.minimum(space, KDTree([*labels, (1e9, 1e9)]).query(points)[0])
-        if space.size and space.max() > _LABEL_SPACE:
+        if space.size and space.max() > label_space:
             labels.append(points[int(np.argmax(space))])
     if labels:
         places: Any = inches.inverted().transform(labels)
@@ -248,9 +238,9 @@ def _mark(sheet: Sheet, panel: Panel, cells: Cells, label: str, look: Look, zord
 
 
 def _large(panel: Panel, cells: Cells) -> Cells:
-    """The cells of connected regions that a hatch of some width and height fits into."""
+    """The cells of connected regions that 0.09 inches of hatch fit into, each way: less is a scrap of hatch."""
     window = panel.axes.bbox.transformed(panel.axes.figure.dpi_scale_trans.inverted())
-    least = np.ceil(_SCRAP * np.array(cells.shape) / (window.height, window.width))
+    least = np.ceil(0.09 * np.array(cells.shape) / (window.height, window.width))
     high, wide = np.maximum(1, least).astype(int)
     # beyond the frame a region may go on
     around = np.pad(cells, [(high, high), (wide, wide)], "edge")

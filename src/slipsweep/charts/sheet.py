@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from slipsweep.charts import solved, style
 from slipsweep.charts.style import Floats, Look, Options
@@ -259,9 +259,7 @@ def is_log(values: Floats) -> bool:
 def log_ticks(axis: Any, span: float) -> None:
     """Ticks of a logarithmic axis over some ratio of its ends, with numbers as people write them."""
     axis.set_major_locator(LogLocator(subs=(1, 2, 5) if span < 2000 else (1,)))
-    axis.set_major_formatter(
-        FuncFormatter(lambda value, _: f"{value:,.0f}".replace(",", " ") if value >= 1e4 else f"{value:g}")
-    )
+    axis.set_major_formatter(lambda value, _: f"{value:,.0f}".replace(",", " ") if value >= 1e4 else f"{value:g}")
     axis.set_minor_formatter(NullFormatter())
 
 
@@ -292,9 +290,7 @@ def log_axis(axes: Axes, values: Floats, label: str, least: float | None = 1.0, 
     low = max(float(there.min()), high * 1e-7)
     if least is not None and high > 10 * least:
         low = least if zeros and (values <= 0).any() else max(low, least)
-    axes.set_yscale("log")
-    axes.set_ylim(low / 1.2, high * 1.5)
-    axes.set_ylabel(label)
+    axes.set(yscale="log", ylim=(low / 1.2, high * 1.5), ylabel=label)
     log_ticks(axes.yaxis, high / low * 100)
     axes.grid(color="0.9", which="major")
     axes.set_axisbelow(True)
@@ -314,8 +310,7 @@ def curve_looks(number: int) -> list[Look]:
 def plot_curve(axes: Axes, xs: Floats, ys: Floats, offset: float = 0.0, **look: Any) -> Any:
     """Draw a line with a few markers, and one on each value that has no neighbour to be joined with.
 
-    `offset` moves the markers by that part of their distance, so that those of several curves lie apart.  On a
-    logarithmic axis there is a gap where nothing is above zero.
+    `offset` moves the markers by that part of their distance.  Zeros leave gaps where the ordinate is logarithmic.
     """
     if axes.get_yscale() == "log":
         ys = np.where(ys > 0, ys, np.nan)

@@ -91,14 +91,10 @@ class Result:
             raise InputError(f"{self.name}: {problem}; {did_you_mean(given, there)}{more}")
         return given
 
-    def quantity(self, name: str) -> str:
-        """`name` if it is a result that contours and curves can show."""
+    def compared(self, name: str) -> list[str]:
+        """A quantity with its flags, and Newmark's displacement if the file has it, or the record to solve it under."""
         if self.result(name) in ("sliding_mode", "validity"):
             raise InputError(f"{self.name}: --variable {name}: is a code, not a quantity; --kind modes shows the modes")
-        return name
-
-    def compared(self, name: str) -> list[str]:
-        """A result with its flags, and Newmark's displacement if the file has it, or the record to solve it under."""
         theirs = "newmark_displacement"
         known = theirs in self.variables or (self.motion is not None and not is_newmark(self.data))
         return [name, "validity", *([theirs] if name == DISPLACEMENT and known else [])]
@@ -128,24 +124,20 @@ class Result:
         at 1.  Every parameter is a coordinate; the attribute ``picked`` names the case and motion that were selected.
         """
         cuts, exact, picked = self.places(at), {}, {}
-        index: dict[str, Any] = {}
-        for dim in self.dims:
+        index: dict[str, Any] = {dim: one for dim, one in keep.items() if isinstance(one, slice)}
+        for dim in [one for one in self.dims if one not in index]:
             middle = 0 if dim in NAMED else (self.data.sizes[dim] - 1) // 2
             if dim == "polarity":
                 middle = int(np.argmax(self.data[dim].values))
             chosen: Any = keep[dim] if dim in keep else cuts.get(dim) or [Place(math.nan, middle)]
-            if isinstance(chosen, slice):
-                index[dim] = chosen
-                continue
             if dim not in keep and len(chosen) > 1:
                 raise InputError(f"{self.name}: {dim} = {at[dim]}: several values are for curves or panels only")
-            dims = (dim,) if dim in keep else ()
-            shape = [len(chosen)] * len(dims)
+            dims, shape = ((dim,), [len(chosen)]) if dim in keep else ((), [])
             index[dim] = np.reshape([place.index or 0 for place in chosen], shape)
             if any(place.index is None for place in chosen):
                 exact[dim] = dims, np.reshape([one.value for one in chosen], shape), PARAMETERS[dim]
             elif not dims and dim in NAMED and (labels := axis_labels(self.data, dim)):
-                picked[dim] = labels[int(index[dim])]
+                picked[dim] = labels[chosen[0].index]
         there = [name for name in names if name in self.variables]
         data = self.data[there].isel(index, missing_dims="ignore").load().assign_coords(exact)
         if exact and "displacement_amplitude" in data.coords:
@@ -205,8 +197,7 @@ class Result:
                 raise InputError(f"{self.name}: {dim} = {options.at[dim]}: {why}")
         # more than one value for every two dots on paper are lost
         thinned = {dim: slice(0, size, math.ceil(size / _POINTS)) for dim, size in self.data.sizes.items()}
-        if across not in kept:
-            kept[across] = thinned[across]
+        kept.setdefault(across, thinned[across])
         if up:
             kept[up] = thinned[up] if y else places.get(up) or self.spread(up, _CURVES)
         panels = list(options.panels) or [dim for dim in several if dim not in kept]

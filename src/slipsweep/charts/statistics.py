@@ -43,15 +43,13 @@ def draw_fragility(sheet: Sheet) -> Figure:
         curves = panel.grid("exceedance_probability")
         for member, (curve, look) in enumerate(zip(curves, curve_looks(len(curves)), strict=True)):
             text = panel.member(member) or f"d = {fixed}"
-            place = member / len(curves)
-            sheet.legend[text] = plot_curve(panel.axes, panel.xs, curve, place, label=text, **look)
+            sheet.legend[text] = plot_curve(panel.axes, panel.xs, curve, member / len(curves), label=text, **look)
         shares = panel.grid("valueless_share")
         if shares.any():
             dotted = panel.axes.plot(panel.xs, shares.max(axis=0), color="0.4", linestyle=":")
             sheet.legend["no value (share)"] = dotted[0]
-        panel.axes.set_ylim(-0.02, 1.02)
         given = "u > d" if fixed is None or sheet.y is None else f"u > {fixed}"
-        panel.axes.set_ylabel(f"probability of exceedance P({given})")
+        panel.axes.set(ylim=(-0.02, 1.02), ylabel=f"probability of exceedance P({given})")
     return sheet.done()
 
 
@@ -84,7 +82,11 @@ def sensitivity(result: Result, options: Options) -> Figure:
     left = [dim for dim in result.wide if dim in PARAMETERS and dim in result.data["total_index"].dims]
     bars = options.x is None and not {*left} - {*options.at, *options.panels}
     sheet = result.sheet(options, names, "input" if bars else _AXES, keep=["bound", "input"])
-    _note_status(sheet)
+    status = {*sheet.data["sensitivity_status"].values.flat}
+    reasons = [one.text for one in SensitivityStatus if one in status and one != SensitivityStatus.COMPUTED]
+    if not np.isfinite(sheet.data["total_index"]).any():
+        raise InputError(f"no Sobol indices in this slice: {'; '.join(reasons)}; choose another slice (--at)")
+    sheet.notes += [f"No indices where {text}." for text in reasons]
     inputs = axis_labels(sheet.data, "input")
     symbols = [" + ".join(style.SYMBOLS.get(one, style.plain(one)) for one in name.split("+")) for name in inputs]
     if bars:
@@ -99,8 +101,7 @@ def sensitivity(result: Result, options: Options) -> Figure:
             solid = {**look, "linestyle": "-", "label": symbols[at]}
             sheet.legend[symbols[at]] = plot_curve(panel.axes, panel.xs, total[at], at / len(inputs), **solid)
             panel.axes.plot(panel.xs, first[at], color=look["color"], **_FIRST_ORDER)
-        panel.axes.set_ylim(*_ends(sheet, intervals=False))
-        panel.axes.set_ylabel("Sobol index of the permanent displacement")
+        panel.axes.set(ylim=_ends(sheet, intervals=False), ylabel="Sobol index of the permanent displacement")
     sheet.remarks["total"] = Line2D([], [], color="0.3")
     sheet.remarks["first order"] = Line2D([], [], color="0.3", **_FIRST_ORDER)
     sheet.remarks["95 % interval (total)"] = Patch(alpha=0.15, linewidth=0, color="0.3")
@@ -121,20 +122,10 @@ def _draw_bars(sheet: Sheet, symbols: list[str]) -> None:
             ends = np.maximum([values - low, high - values], 0.0)
             panel.axes.errorbar(values, at, xerr=ends, fmt="none", color="black", capsize=2.5)
         panel.axes.set_yticks(np.arange(len(order)), [symbols[at] for at in order])
-        panel.axes.set_ylim(-0.6, len(order) - 0.4)
-        panel.axes.set_xlim(*_ends(sheet, intervals=True))
         panel.axes.axvline(0, color="0.6", linewidth=0.8, zorder=0)
-        panel.axes.set_xlabel("Sobol index of the permanent displacement")
+        label = "Sobol index of the permanent displacement"
+        panel.axes.set(ylim=(-0.6, len(order) - 0.4), xlim=_ends(sheet, intervals=True), xlabel=label)
     sheet.legend["95 % interval"] = Line2D([], [], color="black", marker="|", markersize=6)
-
-
-def _note_status(sheet: Sheet) -> None:
-    """Say why there are no indices at some grid points (InputError if there are none at all)."""
-    status = {int(one) for one in np.unique(sheet.data["sensitivity_status"].values)}
-    reasons = [one.text for one in SensitivityStatus if int(one) in status - {0}]
-    if not np.isfinite(sheet.data["total_index"].values).any():
-        raise InputError(f"no Sobol indices in this slice: {'; '.join(reasons)}; choose another slice (--at)")
-    sheet.notes += [f"No indices where {text}." for text in reasons]
 
 
 def _ends(sheet: Sheet, intervals: bool) -> tuple[float, float]:

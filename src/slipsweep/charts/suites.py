@@ -79,10 +79,9 @@ def intensity(result: Result, options: Options) -> Figure:
     text = INTENSITY_MEASURES[measure]["long_name"].removesuffix(" as recorded")
     for panel, (xs, ys, polarity) in zip(sheet.panels, drawn, strict=True):
         log_axis(panel.axes, displacements, _LABEL)
+        panel.axes.set(xscale="log" if wide else "linear", xlabel=f"{text} ({style.unit(measure)})")
         if wide:
-            panel.axes.set_xscale("log")
             log_ticks(panel.axes.xaxis, there.max() / there.min())
-        panel.axes.set_xlabel(f"{text} ({style.unit(measure)})")
         low, negative = panel.axes.get_ylim()[0], polarity < 0
         marks: dict[str, tuple[Any, Floats, Look]] = {
             "polarity 1" if negative.any() else "a motion": (~negative & (ys >= low), ys, _POINT),
@@ -208,8 +207,7 @@ def _draw_regression(sheet: Sheet, panel: Panel, xs: Floats, ys: Floats) -> None
         panel.add_title("no regression: one value for all motions")
     else:
         found: Any = stats.linregress(np.log(xs[slid]), np.log(ys[slid]))
-        rest = np.log(ys[slid]) - found.intercept - found.slope * np.log(xs[slid])
-        scatter = float(np.sqrt(np.sum(rest**2) / (rest.size - 2)))
+        scatter = found.stderr * np.std(np.log(xs[slid])) * np.sqrt(slid.sum())
         ends = np.geomspace(xs[slid].min(), xs[slid].max(), 50)
         line = np.exp(found.intercept) * ends**found.slope
         look: Look = {"color": "0.2", "linewidth": 1.2, "linestyle": (0, (6, 2))}
