@@ -4,17 +4,17 @@ from pathlib import Path
 
 import pytest
 
-from slipsweep import cli
 from slipsweep._version import __version__
+from tests.support.commands import run_command
 
 BLOCK = ("simulate", "--theta", "5", "--mu-s", "0.38", "--frequency", "2")
 SWEEP = "[axes]\ntheta.values = [5]\nmu_s.values = [0.4]\namplitude.values = [4]\nfrequency.values = [2]\n"
 
 
-def told(capsys: pytest.CaptureFixture[str], *arguments: str, status: int = 0) -> str:
-    assert cli.main(list(arguments)) == status
-    out, error = capsys.readouterr()
-    return error if status else out
+def told(*arguments: object, status: int = 0) -> str:
+    ended = run_command(*arguments)
+    assert ended.status == status, ended.errors
+    return ended.errors if status else ended.output
 
 
 @pytest.mark.parametrize(
@@ -35,10 +35,8 @@ def told(capsys: pytest.CaptureFixture[str], *arguments: str, status: int = 0) -
         (("--displacement-amplitude", "30mm"), ("--displacement-amplitude", "0.03"), "displacement amplitude 0.03 m"),
     ],
 )
-def test_simulate_takes_units_and_says_what_it_took(
-    capsys: pytest.CaptureFixture[str], typed: tuple[str, ...], same: tuple[str, ...], echo: str
-) -> None:
-    first, other = (told(capsys, *BLOCK, *given) for given in (typed, same))
+def test_simulate_takes_units_and_says_what_it_took(typed: tuple[str, ...], same: tuple[str, ...], echo: str) -> None:
+    first, other = (told(*BLOCK, *given) for given in (typed, same))
     assert first == other
     assert "taken as                theta 5 degree, " in first
     assert echo in first
@@ -56,10 +54,8 @@ def test_simulate_takes_units_and_says_what_it_took(
         (("--amplitude", "-0.1g"), "amplitude = -0.981"),
     ],
 )
-def test_a_unit_that_does_not_fit_is_refused(
-    capsys: pytest.CaptureFixture[str], given: tuple[str, ...], message: str
-) -> None:
-    assert message in told(capsys, *BLOCK, *given, status=2)
+def test_a_unit_that_does_not_fit_is_refused(given: tuple[str, ...], message: str) -> None:
+    assert message in told(*BLOCK, *given, status=2)
 
 
 @pytest.mark.parametrize(
@@ -70,57 +66,52 @@ def test_a_unit_that_does_not_fit_is_refused(
         (("--amplitude", "2.9", "--rise", "literal"), "kd_not_positive: literal rise: Kd <= 0"),
     ],
 )
-def test_simulate_without_a_value_says_why_and_fails(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, given: tuple[str, ...], flag: str
-) -> None:
-    message = told(capsys, *BLOCK, *given, "-o", str(tmp_path / "a.csv"), status=1)
+def test_simulate_without_a_value_says_why_and_fails(tmp_path: Path, given: tuple[str, ...], flag: str) -> None:
+    message = told(*BLOCK, *given, "-o", tmp_path / "a.csv", status=1)
     assert f"the model gives no value: {flag}" in message
     assert message.count("\n") == 1
     assert not (tmp_path / "a.csv").exists()
 
 
-def test_reasons_and_remedies(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_reasons_and_remedies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An angle taken for a coefficient, values that a record lacks, an axis that is not there, and unsound places."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a.toml").write_text(SWEEP.replace("0.4", "22"))
-    assert "no cell has a value: 1 - tan(theta) (mu_s - tan(theta)) <= 0" in (out := told(capsys, "run", "a.toml"))
+    assert "no cell has a value: 1 - tan(theta) (mu_s - tan(theta)) <= 0" in (out := told("run", "a.toml"))
     assert "did you mean phi = 22?" in out
     (tmp_path / "a.csv").write_text("0,1\n1,-999\n2,0\n")
-    message = told(capsys, "simulate", "--record", "a.csv", "--units", "m/s2", *BLOCK[1:5], status=2)
+    message = told("simulate", "--record", "a.csv", "--units", "m/s2", *BLOCK[1:5], status=2)
     assert "--gaps linear interpolates" in message
     axes = SWEEP.replace("mu_s", "phi").replace("0.4", "20, 22").replace("[4]", "[2, 4, 6, 8, 10, 12]")
     (tmp_path / "b.toml").write_text(axes)
-    assert "unsound: the displacement falls with A in " in told(capsys, "run", "b.toml")
-    told(capsys, "chart", "b.nc", "-k", "curve", "--at", "mu_s=0.404", "-o", "a.png")
-    message = told(capsys, "chart", "b.nc", "--at", "frequncy=2", "-o", "b.png", status=2)
+    assert "unsound: the displacement falls with A in " in told("run", "b.toml")
+    told("chart", "b.nc", "-k", "curve", "--at", "mu_s=0.404", "-o", "a.png")
+    message = told("chart", "b.nc", "--at", "frequncy=2", "-o", "b.png", status=2)
     assert 'frequncy = 2: no such axis; did you mean "frequency"?' in message
 
 
-def test_hazard_of_samples_has_a_table_for_each_frequency(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_hazard_of_samples_has_a_table_for_each_frequency(tmp_path: Path) -> None:
     (tmp_path / "curve.csv").write_text("PGA (g),annual rate\n0.1,0.01\n1,0.0001\n")
     uncertain = '[uncertainty]\nsamples = 8\nthresholds = ["1cm"]\n'
     uncertain += '[uncertainty.mu_s]\ndistribution = "lognorm"\ns = 0.1\nscale = 0.4\n'
     axes = SWEEP.replace("mu_s.values = [0.4]\n", "").replace("[4]", "[2, 5, 8]").replace("[2]", "[1, 2]")
     (tmp_path / "a.toml").write_text(axes + uncertain)
-    result = str(tmp_path / "a.nc")
-    told(capsys, "run", str(tmp_path / "a.toml"), "-o", result)
-    figure = tmp_path / "rates.png"
-    out = told(capsys, "hazard", result, "--curve", str(tmp_path / "curve.csv"), "-d", "1cm", "-o", str(figure))
+    result, figure = tmp_path / "a.nc", tmp_path / "rates.png"
+    told("run", tmp_path / "a.toml", "-o", result)
+    out = told("hazard", result, "--curve", tmp_path / "curve.csv", "-d", "1cm", "-o", figure)
     assert figure.exists()
     for frequency in (1, 2):
         assert f"theta = 5, frequency = {frequency}\n" in out
     assert out.count("annual rate") == 2
 
 
-def test_limit_says_what_it_took(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_limit_says_what_it_took(tmp_path: Path) -> None:
     sweep = tmp_path / "a.toml"
     sweep.write_text(SWEEP)
-    bare = told(capsys, "limit", str(sweep), "-d", "0.05", "--maximum-amplitude", "19.62")
+    bare = told("limit", sweep, "-d", "0.05", "--maximum-amplitude", "19.62")
     assert "\ndisplacement 0.05 m, searched up to 19.62 m/s2 (2 g)\n" in bare
-    assert bare == told(capsys, "limit", str(sweep), "-d", "50mm", "--maximum-amplitude", "2g")
+    assert bare == told("limit", sweep, "-d", "50mm", "--maximum-amplitude", "2g")
 
 
-def test_version(capsys: pytest.CaptureFixture[str]) -> None:
-    assert told(capsys, "--version") == f"slipsweep {__version__}\n"
+def test_version() -> None:
+    assert told("--version") == f"slipsweep {__version__}\n"
