@@ -16,7 +16,6 @@ from slipsweep.model.units import quantity
 if TYPE_CHECKING:
     import xarray as xr
 
-#: The group of options that say what of the measurement is used, and how.
 TEST = options.Panel("Measurement")
 
 #: Columns of a test.
@@ -118,11 +117,10 @@ def calibrate(
     """Estimate yield acceleration, λ and Δμ from one or several tests."""
     given = measured.given(model.g)
     paths = common.check_outputs(output, (".nc", ".toml", *FIGURES), overwrite, tests)
-    from slipsweep.studies.calibration import calibrate as calibrated
-    from slipsweep.studies.calibration import sweep_file_text
+    from slipsweep.studies import calibration
 
-    table = calibrated(tests, **given, model=model, cycles=cycles)
-    text = sweep_file_text(table.attrs["model_table"], table.attrs["uncertainty_table"])
+    table = calibration.calibrate(tests, **given, model=model, cycles=cycles)
+    text = calibration.sweep_file_text(table.attrs["model_table"], table.attrs["uncertainty_table"])
     common.write_outputs(paths, overwrite, table, toml=lambda: text)
     if quiet:
         return

@@ -38,7 +38,7 @@ RARE = Panel("Rare options")  # that few cases need
 
 def read(metavar: str, about: str) -> Any:
     """The argument that names what a command reads."""
-    return typer.Argument(metavar=metavar, help=about)
+    return typer.Argument(metavar=metavar, help=about.replace("[", r"\["))
 
 
 def written(about: str, metavar: str = "FILE") -> Any:

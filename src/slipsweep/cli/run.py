@@ -144,8 +144,6 @@ def unsound_text(table: "xr.Dataset") -> str:
 
 def _why_nothing_slides(table: "xr.Dataset", tally: "Tally") -> str:
     """The likely reason why every cell is stuck or has no value; empty where one slides."""
-    import numpy as np
-
     modes, g, coords = tally.modes or {}, float(table.attrs["g"]), table.coords
     if not modes or modes[SlidingMode.STICK_SLIP] + modes[SlidingMode.CONTINUOUS]:
         return ""
@@ -157,8 +155,9 @@ def _why_nothing_slides(table: "xr.Dataset", tally: "Tally") -> str:
         return f"no cell has a value: {why}" + (f"; did you mean phi = {mu_s:.6g}?" if is_angle else "")
     if not {"amplitude", "theta", "mu_s"} <= {*coords}:
         return "no cell slides"
-    coulomb = g * np.tan(np.arctan(coords["mu_s"].min()) - np.radians(coords["theta"].max()))
-    least, largest = float(coords.get("yield_acceleration", coulomb).min()), float(coords["amplitude"].max())
+    coulomb = g * math.tan(math.atan(coords["mu_s"].min()) - math.radians(coords["theta"].max()))
+    least = float(coords["yield_acceleration"].min()) if "yield_acceleration" in coords else coulomb
+    largest = float(coords["amplitude"].max())
     hint = '; did you mean units = "g"?' if largest <= 3.0 and largest * g > least else ""
     texts = (range_text("amplitude", (one,), g) for one in (largest, least))
     return "no cell slides: largest amplitude {}, smallest yield acceleration {}".format(*texts) + hint
