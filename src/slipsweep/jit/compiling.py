@@ -1,6 +1,6 @@
 """Kernels: the functions that Python calls, compiled once and kept on disk for the processes that come after.
 
-* Of several processes that start at once the first compiles, under a lock; the others load what it has kept.
+* Of several processes that need a kernel at once the first compiles it, under its lock; the others load what it keeps.
 * What is kept lies in a folder whose name is a digest of all sources that kernels are made of: a changed equation is
   never served from an old one.
 * Machine code is loaded from a folder of this user only, in which nobody else may write.  Where there is none, kernels
@@ -71,7 +71,7 @@ def _compiled(function: Callable[..., Any], types: tuple[Any, ...]) -> Any:
         warnings.simplefilter("ignore", numba.NumbaWarning)
         if folder is not None:
             # no lock to be had, as on some network folders, or a full disk: each process compiles for itself
-            lock = filelock.FileLock(folder / "compiling.lock", timeout=_PATIENCE)
+            lock = filelock.FileLock(folder / f"{function.__name__}.lock", timeout=_PATIENCE)
             with contextlib.suppress(OSError, NotImplementedError), lock:
                 return _compiled_in(folder, function, types)
         return _compiled_in(None, function, types)
