@@ -27,15 +27,11 @@ from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import Sine, Waveform, peak_acceleration
 
-#: Cells that a kernel solves in a call, at least and at most: so many that Python's part is small, so few that Ctrl-C
-#: is heard between two calls.
+#: Cells that a kernel solves in a call, at least and at most: Python's part is small, and Ctrl-C heard between two.
 _LEAST_TILE, _MOST_TILE = 16384, 65536
 
 #: Powers of 1/ω, or of the factor on a record's time, in results; others do not scale with the time.
 _POWERS = {"permanent_displacement": 2, "newmark_displacement": 2, "peak_relative_velocity": 1}
-
-#: Inputs that make another motion of the base, hence another table of pieces.
-_MOTIONS = ("motion", "azimuth", "polarity")
 
 #: Inputs or results by their names.
 Variables: TypeAlias = Mapping[str, xr.Variable]
@@ -72,10 +68,10 @@ class Request:
         dims, shape = tuple(self.sizes), tuple(self.sizes.values())
         return {name: xr.Variable(dims, np.empty(shape, dtype)) for name, dtype in self.dtypes.items()}
 
-    def count(self) -> None:
-        """Report all cells as finished."""
+    def count(self, cells: int) -> None:
+        """Report cells as finished."""
         if self.progress is not None:
-            self.progress(self.cells)
+            self.progress(cells)
 
     def part(self, chunk: Chunk) -> "Request":
         """The same of a part of the grid."""
@@ -115,7 +111,7 @@ def amplitudes(request: Request) -> Variables:
     for where, part in motions(request):
         for one in results.values():
             one[where] = cell_inputs(part.problem, part.inputs)["amplitude"]
-        part.count()
+        part.count(part.cells)
     return results
 
 
@@ -124,7 +120,7 @@ def motions(request: Request) -> Iterator[tuple[Chunk, Request]]:
 
     Of a suite each is under a record of its own, with which a solver goes on as if there were no other.
     """
-    own = (request.inputs[name].sizes for name in _MOTIONS if name in request.inputs)
+    own = (request.inputs[name].sizes for name in ("motion", "azimuth", "polarity") if name in request.inputs)
     varying = {str(dim): size for sizes in own for dim, size in sizes.items()}
     suite = request.problem.excitation
     for where in grid_chunks(varying, 1):
@@ -137,9 +133,9 @@ def motions(request: Request) -> Iterator[tuple[Chunk, Request]]:
         yield where, part
 
 
-def cell_inputs(problem: Problem, inputs: Variables) -> dict[str, xr.Variable]:
-    """The fields of `Cell` that are given; the amplitude is that of a waveform, or the factor on a record."""
-    given: dict[str, Any] = dict(inputs)
+def cell_inputs(problem: Problem, inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """The fields of `Cell` that are given, of variables or arrays that broadcast; under a record A is its factor."""
+    given = dict(inputs)
     if isinstance(record := problem.excitation, Record):
         given["amplitude"] = strength_factor(record.times, record.acceleration, inputs)
     elif "displacement_amplitude" in inputs:
@@ -151,10 +147,10 @@ def cell_inputs(problem: Problem, inputs: Variables) -> dict[str, xr.Variable]:
     return {name: given[name] for name in Cell._fields if name in given}
 
 
-def phase_seconds(problem: Problem, inputs: Variables) -> xr.Variable:
+def phase_seconds(problem: Problem, inputs: Mapping[str, Any]) -> Any:
     """Seconds that a unit of the kernels' phase takes: 1/ω, or the factor on the time of a record."""
     if isinstance(problem.excitation, Waveform):
-        return 1.0 / (2.0 * math.pi * inputs["frequency"]) if "frequency" in inputs else xr.Variable((), 1.0)
+        return 1.0 / (2.0 * math.pi * inputs["frequency"]) if "frequency" in inputs else np.ones(())
     return inputs["time_scale"]
 
 
@@ -169,55 +165,60 @@ def _scaled_dimension(request: Request) -> str | None:
 
 
 def _fill(results: Variables, request: Request, solver: solvers.Solver, finite: bool = True) -> None:
-    """Fill in results, tile by tile."""
-    scaled = _scaled_dimension(request)
+    """Fill in results, tile by tile, cut from plain arrays: names of dimensions take a part of the cells' time."""
+    scaled, dims = _scaled_dimension(request), tuple(request.sizes)
     solved = {dim: size for dim, size in request.sizes.items() if dim != scaled}
     share = math.prod(solved.values()) // (8 * threads.thread_count())
     tile = max(min(max(share, _LEAST_TILE), _MOST_TILE) // solvers.cost_of(request.problem), 1)
+    arrays = {name: one.set_dims(dims).values for name, one in request.inputs.items()}
 
     def work(chunk: Chunk) -> None:
-        part = request.part(chunk)
-        _fill_tile(variables_within(chunk, results), part, scaled, solver, finite)
-        part.count()
+        where = [chunk.get(dim, slice(None)) for dim in dims]
+        targets = {name: one.data[(*where, ...)] for name, one in results.items()}
+        given = {}
+        for name, values in arrays.items():
+            own = (cut if size > 1 else slice(None) for cut, size in zip(where, values.shape, strict=True))
+            given[name] = values[(*own, ...)]
+        shape = tuple(chunk[dim].stop - chunk[dim].start if dim in chunk else 1 for dim in dims)
+        _fill_tile(targets, request.problem, given, shape, solver, finite)
+        request.count(next(iter(targets.values())).size)
 
     threads.spread(list(grid_chunks(solved, tile)), work)
 
 
-def _fill_tile(results: Variables, request: Request, scaled: str | None, solver: solvers.Solver, finite: bool) -> None:
+def _fill_tile(
+    results: dict[str, NDArray[Any]], problem: Problem, inputs: Mapping[str, NDArray[Any]], shape: tuple[int, ...],
+    solver: solvers.Solver, finite: bool,
+) -> None:  # fmt: skip
     """Solve the cells of a tile, in all its dimensions but the scaled one, and spread them over the results."""
-    dims = tuple(request.sizes)
-    shape = tuple(1 if dim == scaled else size for dim, size in request.sizes.items())
     cells = np.full((*shape, len(Cell._fields)), math.nan).view(CELL)[..., 0]
     with np.errstate(all="ignore"):  # results that overflow are refused below
-        for name, one in cell_inputs(request.problem, request.inputs).items():
-            cells[name] = one.set_dims(dims).values
+        for name, values in cell_inputs(problem, inputs).items():
+            cells[name] = values
         found = np.empty((1 + max(solver.rows.values()), cells.size))
         solver.solve(cells.reshape(-1), found)
         validity = found[solver.rows["validity"]].reshape(shape).astype(np.int16)
         if (validity & UNSOLVED).any():
             why = "an event of the motion was not found; please report this cell, with the options of the run"
-            raise RunError(f"{_inputs_at(validity & UNSOLVED != 0, request)}: {why}")
+            raise RunError(f"{_inputs_at(validity & UNSOLVED != 0, problem, inputs)}: {why}")
         valued = validity & np.int16(known.VALUELESS) == 0
-        seconds = phase_seconds(request.problem, request.inputs).set_dims(dims).values
-        for name, result in results.items():
+        seconds = phase_seconds(problem, inputs)
+        for name, target in results.items():
             own, factor = found[solver.rows[name]].reshape(shape), seconds ** _POWERS.get(name, 0)
-            target = np.multiply(own, factor, out=result.data, casting="unsafe")
+            np.multiply(own, factor, out=target, casting="unsafe")
             largest = np.abs(own[valued]).max(initial=0.0) if target.dtype.kind == "f" else 0.0
             if finite and not math.isfinite(largest * factor.max()) and (wrong := valued & ~np.isfinite(target)).any():
                 why = f"{name} is then no finite number in double precision; must be nearer to 1"
-                raise InputError(f"{_inputs_at(wrong, request)}: {why}")
-    if "structure_frequency" in request.inputs and "validity" in results:
+                raise InputError(f"{_inputs_at(wrong, problem, inputs)}: {why}")
+    if "structure_frequency" in inputs and "validity" in results:
         # a block that is not rigid, 0.2 ≤ f/fs ≤ 1.3
-        ratio = request.inputs["frequency"] / request.inputs["structure_frequency"]
-        flexible = ((ratio >= 0.2) & (ratio <= 1.3)).set_dims(dims).values
-        results["validity"].data |= flexible * np.int16(known.Validity.FLEXIBLE_BLOCK)
+        ratio = inputs["frequency"] / inputs["structure_frequency"]
+        results["validity"] |= ((ratio >= 0.2) & (ratio <= 1.3)) * np.int16(known.Validity.FLEXIBLE_BLOCK)
 
 
-def _inputs_at(wrong: NDArray[np.bool_], request: Request) -> str:
+def _inputs_at(wrong: NDArray[np.bool_], problem: Problem, inputs: Mapping[str, NDArray[Any]]) -> str:
     """The inputs of the first cell that is wrong, in words."""
-    shape = tuple(request.sizes.values())
-    place = np.unravel_index(int(np.broadcast_to(wrong, shape).argmax()), shape)
-    cell = dict(zip(request.sizes, place, strict=True))
-    inputs = {name: float(one.isel(cell, missing_dims="ignore")) for name, one in request.inputs.items()}
-    inputs["g"] = request.problem.model.g
-    return ", ".join(f"{name} = {number_text(value)}" for name, value in inputs.items())
+    every = np.broadcast_arrays(wrong, *inputs.values())
+    cell = np.unravel_index(int(every[0].argmax()), every[0].shape)
+    values = {name: float(one[cell]) for name, one in zip(inputs, every[1:], strict=True)} | {"g": problem.model.g}
+    return ", ".join(f"{name} = {number_text(value)}" for name, value in values.items())

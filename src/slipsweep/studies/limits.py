@@ -207,7 +207,7 @@ def _solve(maximum_amplitude: float, steps: int, request: Request) -> Variables:
             part = motion.part(chunk)
             for name, values in _solve_part(part, maximum_amplitude, steps).items():
                 results[name][chunk | where] = values
-            part.count()
+            part.count(part.cells)
     return results
 
 
