@@ -7,7 +7,6 @@ from typing import Annotated
 from slipsweep.cli import common, options
 from slipsweep.cli.common import echo
 from slipsweep.cli.options import Text, Texts, command
-from slipsweep.cli.run import unsound_text
 from slipsweep.errors import InputError
 
 TABLE = options.Panel("Table")
@@ -34,7 +33,6 @@ def info(file: options.Result, displacement: Annotated[Texts, options.LENGTH] = 
         common.echo_tally(tally_of(table))
     except InputError as error:
         echo(f"modes and flags not counted: {error}")
-    echo(*filter(None, [unsound_text(table)]))
     if displacement and table.sizes.get("motion", 1) < 2 and "displacement_quantile" not in table:
         raise InputError(f"{file}: --displacement: is for results of a suite of motions, or of uncertain inputs")
     chosen = selection.selected(table, file, options.cuts(at), ("motion", "quantile", "threshold"))

@@ -117,12 +117,12 @@ def run(
         echo(f"the same motion under several labels: {template.attrs['duplicate_motions']}")
     common.echo_tally(report.tally)
     result = opening.read_result(report.path)
-    echo(*filter(None, (_why_nothing_slides(template, report.tally), unsound_text(result))))
+    echo(*filter(None, (_why_nothing_slides(template, report.tally), _unsound_text(result))))
     common.echo_suite(result, most=20)
     echo(f"{report.path}  {size_text(storing.nbytes_of(report.path))}")
 
 
-def unsound_text(table: "xr.Dataset") -> str:
+def _unsound_text(table: "xr.Dataset") -> str:
     """How many sliding cells have a trend that no block has, and how many slide continuously with estimated friction.
 
     Of many cells some, evenly spaced, are looked at.

@@ -79,8 +79,8 @@ def _csv(lines: list[str], reading: Reading) -> Samples:
     header, body = _header(lines)
     if not body:
         raise InputError("no line of a time and an acceleration")
-    unit = re.search(r"\bt(?:ime)?\s*[(\[]\s*([a-z]+)", header, re.IGNORECASE)
-    if unit and unit[1].lower() not in ("s", "sec", "seconds"):
+    unit = re.search(r"\bt(?:ime)?\s*[(\[]\s*(ms|msecs?|milliseconds?|min|minutes?)\b", header, re.IGNORECASE)
+    if unit:
         raise InputError(f"time in {unit[1]}: must be in s")
 
     def two(line: str) -> list[str]:

@@ -252,7 +252,8 @@ def read_record(
 
 def _inspected(name: str, times: Floats, values: Floats, unit: str, reading: Reading, attrs: dict[str, str]) -> Record:
     """The record of values in a unit; what is found in it is refused, unless `reading` accepts it."""
-    kept, missing = ~_is_fill(values), "; ".join(missing_samples(times, values))
+    kept = ~_is_fill(values)
+    missing = "; ".join((*missing_samples(times, values), *_held(times[kept], values[kept])))
     if missing and reading.gaps == "refuse":
         raise InputError(f"{name}: {missing}: samples are missing; gaps = 'linear' interpolates between the others")
     record = Record(times[kept], values[kept] * UNITS[unit], name, attrs | {"record_units": unit})
@@ -265,7 +266,7 @@ def _inspected(name: str, times: Floats, values: Floats, unit: str, reading: Rea
 
 
 def missing_samples(times: Floats, values: Floats) -> Iterator[str]:
-    """Values, in any unit, that stand for missing samples, intervals without samples, a value that is held."""
+    """Values, in any unit, that stand for missing samples, and intervals without samples."""
     if (fill := _is_fill(values)).any():
         kinds = ", ".join("blank" if np.isnan(one) else f"{one:g}" for one in np.unique(values[fill])[:3])
         yield f"{fill.sum()} fill value{'s' if fill.sum() > 1 else ''} ({kinds}), first at t = {times[fill][0]:.6g} s"
@@ -280,7 +281,6 @@ def missing_samples(times: Floats, values: Floats) -> Iterator[str]:
             f"no samples from t = {times[at]:.6g} to {times[at + 1]:.6g} s ({intervals[at] / median:.0f} times the "
             f"median interval of {median:.4g} s){more}"
         )
-    yield from _held(times[~fill], values[~fill])
 
 
 def _is_fill(values: Floats) -> NDArray[np.bool_]:
