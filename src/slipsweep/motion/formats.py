@@ -79,8 +79,7 @@ def _csv(lines: list[str], reading: Reading) -> Samples:
     header, body = _header(lines)
     if not body:
         raise InputError("no line of a time and an acceleration")
-    unit = re.search(r"\bt(?:ime)?\s*[(\[]\s*(ms|msecs?|milliseconds?|min|minutes?)\b", header, re.IGNORECASE)
-    if unit:
+    if unit := re.search(r"(?i)\bt(?:ime)?\s*[(\[]\s*(ms|msecs?|milliseconds?|min|minutes?)\b", header):
         raise InputError(f"time in {unit[1]}: must be in s")
 
     def two(line: str) -> list[str]:

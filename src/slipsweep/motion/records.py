@@ -301,6 +301,8 @@ def _is_fill(values: Floats) -> NDArray[np.bool_]:
 
 def _held(times: Floats, values: Floats) -> Iterator[str]:
     """The first value that does not change while the ground shakes."""
+    if times.size <= _FEWEST or not (np.diff(times) > 0.0).all():
+        return
     starts = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
     lasts = np.flatnonzero(np.diff(values, append=np.nan) != 0.0)
     own, peak = values[starts], np.abs(values).max(initial=0.0)

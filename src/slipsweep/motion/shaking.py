@@ -129,8 +129,7 @@ def read_test(path: str | Path) -> ShakingTest:
     values = read_columns(path, lines, channel_of, ("time", TABLE), example)
     if missing := "; ".join(missing_samples(values["time"], values[TABLE])):
         raise InputError(f"{path}: {TABLE}: {missing}: samples are missing; take the part of the test that has all")
-    name = path.name.encode(errors="backslashreplace").decode()
-    attrs = {"test": name, "test_sha256": digest}
+    attrs = {"test": path.name.encode(errors="backslashreplace").decode(), "test_sha256": digest}
     return ShakingTest(values.pop("time"), values, str(path), attrs)
 
 
