@@ -24,8 +24,9 @@ GRID: dict[str, Any] = {
 }
 
 
-def displacement() -> np.ndarray:
-    return slipsweep.sweep(**GRID, variables=["permanent_displacement"]).permanent_displacement.values
+def displacement(waveform: str = "sine") -> np.ndarray:
+    result = slipsweep.sweep(**GRID, excitation=waveform, variables=["permanent_displacement"])
+    return result.permanent_displacement.values
 
 
 @pytest.fixture(scope="module")
@@ -107,11 +108,13 @@ def test_dasks_threads(expected: np.ndarray) -> None:
 @pytest.mark.parametrize("method", [m for m in ("fork", "spawn") if m in multiprocessing.get_all_start_methods()])
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 def test_processes(method: str, expected: np.ndarray) -> None:
-    """Forked after a sweep, too: no thread is left that a child could miss."""
+    """Forked after a sweep, too: no thread is left that a child could miss; and kernels that are loaded give the bits
+    of those that were compiled here."""
     # a process that is not forked takes two seconds to start
     with ProcessPoolExecutor(2 if method == "fork" else 1, multiprocessing.get_context(method)) as pool:
-        for result in [pool.submit(displacement) for _ in range(2)]:
-            np.testing.assert_array_equal(result.result(timeout=120), expected)
+        both = {waveform: pool.submit(displacement, waveform) for waveform in ("sine", "cosine")}
+        np.testing.assert_array_equal(both["sine"].result(timeout=120), expected)
+        np.testing.assert_array_equal(both["cosine"].result(timeout=120), displacement("cosine"))
 
 
 # ---------------------------------------------------------------------------------- Ctrl-C

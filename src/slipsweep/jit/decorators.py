@@ -16,11 +16,9 @@ def part(*fastmath: str, **options: Any) -> Callable[[_Function], _Function]:
     return decorate
 
 
-#: `contract` lets the compiler fuse a*b + c, `arcp` divide by g once.
+#: `contract` lets the compiler fuse a*b + c, `arcp` divide by g once.  Not `reassoc`: sums whose order the compiler
+#: chooses have other last bits in the process that compiles than in those that load the kernel.
 scalar = part("arcp")
-
-#: The same for sums over quadrature nodes, whose order the compiler may then choose (SIMD).
-summed = part("arcp", "reassoc", "nsz")
 
 #: The same for what stands in loops over cells: LLVM vectorises a loop only if everything
 #: in it is inlined, which it does not do by itself with functions as long as these.

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from slipsweep.jit.decorators import scalar, summed
+from slipsweep.jit.decorators import scalar
 from slipsweep.jit.elementary import versine
 from slipsweep.kernels.block import Block, friction
 from slipsweep.kernels.excitation import base_acceleration, offset_at
@@ -62,18 +62,18 @@ def at_nodes(piece: Piece, amplitude: float, start: float, width: float) -> np.n
     return x
 
 
-@summed
+@scalar
 def panel_lag(block: Block, piece: Piece, near: float, until: float, end: float) -> Lag:
     """`Lag` over a panel of the quadrature: 16 nodes of Gauss and Legendre."""
     width = until - near
-    values = at_nodes(piece, block.amplitude, near, width)
+    x, mu = at_nodes(piece, block.amplitude, near, width), np.empty(NODES.size)
+    for node in range(NODES.size):  # alone, so that LLVM takes nodes together
+        mu[node] = friction(block, x[node])
     kept = block.mu_s - block.tan_theta
     first, second, first_x, second_x = 0.0, 0.0, 0.0, 0.0
     for node in range(NODES.size):
-        x = values[node]
-        mu = friction(block, x)
         weight, left = abs(width) * WEIGHTS[node], end - (near + width * NODES[node])
-        rate, rate_x = weight * (block.mu_s - mu), weight * x * (kept - mu)
+        rate, rate_x = weight * (block.mu_s - mu[node]), weight * x[node] * (kept - mu[node])
         first += rate
         second += left * rate
         first_x += rate_x
