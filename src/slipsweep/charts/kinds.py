@@ -1,5 +1,6 @@
 """What is drawn of which result, by command and from Python: the kinds of charts, and all of them as one PDF."""
 
+import io
 import textwrap
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -111,6 +112,13 @@ def draw_all(
     return figures, left_out
 
 
+def save(figure: Figure, path: Path, ending: str) -> None:
+    """Write a figure in the format of an ending."""
+    content = io.BytesIO()  # matplotlib's writers leave a traceback on a full disk
+    figure.savefig(content, format=ending[1:], dpi=150)
+    path.write_bytes(content.getvalue())
+
+
 def write_book(path: Path, result: Result, figures: Iterable[Figure]) -> None:
     """Write a title page and some charts as pages of one PDF."""
     from matplotlib.backends.backend_pdf import PdfPages  # here: other charts do without it
@@ -135,6 +143,8 @@ def title_page(result: Result) -> Figure:
         "Model and estimates": style.model_text(attributes).splitlines(),
         "Range in which the model was compared with measurements": compared,
     }
+    if unsound := solved.unsound_texts(result.data):
+        sections["Unsound"] = unsound
     if not solved.is_recorded(result.data):
         left_out = "; left out of contours and curves unless their caption says that it is drawn"
         sections["Flags that the charts hatch"] = [

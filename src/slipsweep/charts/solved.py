@@ -1,13 +1,23 @@
 """What charts compute on their slice: thresholds, Newmark's block, other options of the model, trends no block has."""
 
+import math
 from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from slipsweep.grid.tally import Tally
 from slipsweep.model.options import MODELS, SOLVERS, Mendez, Model, Newmark
-from slipsweep.model.variables import PARAMETERS, RECORD_INPUTS, STRENGTHS, WAVEFORM_INPUTS, Validity
+from slipsweep.model.variables import (
+    PARAMETERS,
+    RECORD_INPUTS,
+    STRENGTHS,
+    VALUELESS,
+    WAVEFORM_INPUTS,
+    SlidingMode,
+    Validity,
+)
 from slipsweep.motion.waveforms import WAVEFORMS, peak_acceleration
 from slipsweep.studies.datasets import friction_parameters, sweep
 
@@ -15,6 +25,9 @@ from slipsweep.studies.datasets import friction_parameters, sweep
 DRIVES = ("amplitude", "displacement_amplitude")
 
 DISPLACEMENT = "permanent_displacement"
+
+#: Cells, about, of a result that are looked at for what is unsound.
+_LOOKED_AT = 5000
 
 _BLOCK = ("theta", "mu_s", "yield_acceleration")
 
@@ -133,6 +146,24 @@ def unsound(data: xr.Dataset, drawn: xr.DataArray, theirs: xr.DataArray | None) 
     return cells.transpose(*drawn.dims), text
 
 
+def unsound_texts(results: xr.Dataset) -> list[str]:
+    """What a design must not rest on: trends that no block has, and continuous sliding with estimated friction.
+
+    Of many cells some are looked at, evenly spaced; of results that say neither, nothing is said.
+    """
+    drives = {*STRENGTHS, "displacement_amplitude"}
+    if DISPLACEMENT not in results or drives.isdisjoint(results.coords) or is_newmark(results):
+        return []
+    moved = results[DISPLACEMENT]
+    each = math.ceil((moved.size / _LOOKED_AT) ** (1.0 / max(moved.ndim, 1)))
+    some = results.thin(dict.fromkeys(moved.dims, each)).load()
+    drawn = reliable(some, DISPLACEMENT)
+    texts = [unsound(some.assign({DISPLACEMENT: drawn}), drawn, newmark(some))[1]]
+    if {"sliding_mode", "validity"} <= {*some}:
+        texts.append(estimated(some, drawn, some["sliding_mode"] == SlidingMode.CONTINUOUS))
+    return [text for text in texts if text]
+
+
 def estimated(data: xr.Dataset, drawn: xr.DataArray, continuous: xr.DataArray) -> str:
     """The share of the sliding cells that slide continuously with estimated friction, in words (docs/trust.md)."""
     slides = drawn > 0
@@ -141,6 +172,26 @@ def estimated(data: xr.Dataset, drawn: xr.DataArray, continuous: xr.DataArray) -
         return ""
     share = percent(int(cells.sum()) / int(slides.sum()))
     return f"{share} of the sliding cells slide continuously with estimated friction: not for design"
+
+
+def why_nothing_slides(data: xr.Dataset, tally: Tally) -> str:
+    """The likely reason why every cell of a sweep is stuck or has no value; empty where one slides."""
+    modes, coords = tally.modes or {}, data.coords
+    if not modes or modes[SlidingMode.STICK_SLIP] + modes[SlidingMode.CONTINUOUS]:
+        return ""
+    if not modes[SlidingMode.STUCK]:
+        flags = {flag: count for flag, count in (tally.flags or {}).items() if flag in VALUELESS}
+        why = max(flags, key=lambda flag: flags[flag]).text if flags else "validity is not among the variables"
+        mu_s = float(coords["mu_s"].min()) if "mu_s" in coords else 0.0
+        is_angle = mu_s > 3.0 and "phi" not in coords
+        return f"no cell has a value: {why}" + (f"; did you mean phi = {mu_s:.6g}?" if is_angle else "")
+    if "amplitude" not in coords or is_recorded(data):
+        return "no cell slides"
+    g, largest = float(data.attrs["g"]), float(coords["amplitude"].max())
+    least = float(thresholds(data)["yield_line"].min())
+    hint = '; did you mean units = "g"?' if largest <= 3.0 and largest * g > least else ""
+    texts = (f"{one:.6g} m/s2 ({one / g:.4g} g)" for one in (largest, least))
+    return "no cell slides: largest amplitude {}, smallest yield acceleration {}".format(*texts) + hint
 
 
 def percent(share: float) -> str:

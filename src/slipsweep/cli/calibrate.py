@@ -1,6 +1,5 @@
 """`slipsweep friction` and `slipsweep calibrate`: what a test on a shaking table measured."""
 
-import itertools
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,11 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 from slipsweep.cli import common, options
 from slipsweep.cli.common import FIGURES, echo
 from slipsweep.cli.options import Text, Texts, command, written
-from slipsweep.errors import InputError
+from slipsweep.files import outputs
 from slipsweep.model.options import MODELS, Model
 from slipsweep.model.units import quantity
 
 if TYPE_CHECKING:
+    import pandas as pd
     import xarray as xr
 
 TEST = options.Panel("Measurement")
@@ -35,9 +35,15 @@ _SLIDES = {
     "slide_free_body_friction": " by statics",
 }
 
-#: Parameters that a calibration finds, and those of a cycle.
-_FOUND = ("yield_acceleration", "decay_rate", "delta_mu")
-_OF_CYCLES = ("start", *_FOUND, "attenuation_coefficient")
+#: Cycles as a table.
+_CYCLES = {
+    "cycle": "cycle",
+    "cycle_start": "starts, s",
+    "cycle_yield_acceleration": "Üy, m/s2",
+    "cycle_decay_rate": "λ",
+    "cycle_delta_mu": "Δμ",
+    "cycle_attenuation_coefficient": "Kd",
+}
 
 
 @dataclass(frozen=True)
@@ -60,14 +66,16 @@ class Measured:
 @command(
     "Tests on a shaking table",
     "slipsweep friction test.csv --theta 5 --mu-s 0.38",
-    "slipsweep friction test.csv --theta 5 --mu-s 0.38 --rest 0:0.5 --drift all -o friction.png",
+    "slipsweep friction test.csv --theta 5 --mu-s 0.38 --rest 0 0.5 --drift all -o friction.png",
 )
 def friction(
     *,
     test: Annotated[Path, options.read("TEST.csv", _COLUMNS)],
     measured: Measured,
     g: Annotated[float, options.BLOCK("Gravity, m/s².")] = 9.81,
-    rest: Annotated[Text, TEST("Times of rest, s, to find offsets and drifts by.", "FROM:TO")] = None,
+    rest: Annotated[
+        tuple[float, float] | None, TEST("Two times, s, between which all is at rest: finds offsets and drifts by it.")
+    ] = None,
     threshold: Annotated[
         Text, TEST("Relative acceleration of a slide: 0.02g (default: 4 times its noise).", "VALUE")
     ] = None,
@@ -78,25 +86,17 @@ def friction(
     """Compute the friction over a test by Eq. 1 and by statics, and its slides."""
     given = measured.given(g)
     least = None if threshold is None else quantity("--threshold", threshold, "m s-2", g)
-    paths = common.check_outputs(output, (".nc", *FIGURES), overwrite, [test])
+    paths = outputs.check_outputs(output, overwrite, reads=[test], endings=(".nc", *FIGURES))
     from slipsweep.studies.friction import measured_friction
 
-    span = None
-    if rest is not None:
-        try:
-            first, last = map(float, rest.split(":"))
-        except ValueError:
-            raise InputError(f"--rest {rest}: must be two times, s, as FROM:TO") from None
-        span = first, last
-    table = measured_friction(test, **given, g=g, rest=span, threshold=least)
+    table = measured_friction(test, **given, g=g, rest=rest, threshold=least)
     common.write_outputs(paths, overwrite, table)
     if quiet:
         return
     attrs, slides = table.attrs, table[[*_SLIDES]].to_dataframe()[[*_SLIDES]].rename(columns=_SLIDES)
     threshold = f"threshold  {attrs['threshold']:.4g} m/s2: {attrs['threshold_from']}"
     _echo_coefficients(table, threshold, f"removed    {attrs['removed']}")
-    rows = slides.to_string(index=False, na_rep="nan", float_format="{:.4g}".format)
-    echo(f"{len(slides)} slides, s and m/s2:\n{rows}" if len(slides) else "0 slides", *paths)
+    echo(f"{len(slides)} slides, s and m/s2:\n{_text(slides, index=False)}" if len(slides) else "0 slides", *paths)
 
 
 @command(
@@ -116,7 +116,7 @@ def calibrate(
 ) -> None:
     """Estimate yield acceleration, λ and Δμ from one or several tests."""
     given = measured.given(model.g)
-    paths = common.check_outputs(output, (".nc", ".toml", *FIGURES), overwrite, tests)
+    paths = outputs.check_outputs(output, overwrite, reads=tests, endings=(".nc", ".toml", *FIGURES))
     from slipsweep.studies import calibration
 
     table = calibration.calibrate(tests, **given, model=model, cycles=cycles)
@@ -125,32 +125,11 @@ def calibrate(
     if quiet:
         return
     _echo_coefficients(table)
-    echo(f"{'':<24}{'value':>10}{'error':>10}   95 % interval")
-    for name in _FOUND:
-        low, high = table[f"{name}_interval"].values
-        unit = " m/s2" if name == "yield_acceleration" else ""
-        interval = f"{low:.4g} to {high:.4g}{unit}" if math.isfinite(high) else f"{low:.4g}{unit} or more"
-        error = table[f"{name}_error"].item()
-        value = f"{table[name].item():>10.4g}{error:>10.2g}" if math.isfinite(error) else f"{'not determined':>20}"
-        echo(f"{name:<24}{value}   {interval}")
-    echo("correlation")
-    for (i, one), (j, other) in itertools.combinations(enumerate(_FOUND), 2):
-        echo(f"  {f'{one}, {other}':<32}{_number(table['correlation'].values[i, j], '.3f'):>7}")
-    echo("misfit, root mean square, and in parts of the largest value")
-    for name in ("block_acceleration", "relative_velocity", "relative_displacement"):
-        if f"misfit_{name}" in table:
-            misfits, shares = (table[f"{kind}misfit_{name}"] for kind in ("", "relative_"))
-            pairs = zip(misfits.values.flat, shares.values.flat, strict=True)
-            parts = (f"{misfit:.2g} {misfits.attrs['units']}  {share:.1%}" for misfit, share in pairs)
-            echo(f"  {name:<32}{', '.join(parts)}")
+    _echo_parameters(table)
     echo(f"removed: {table.attrs['removed']}")
     for number in range(table.sizes.get("test", 1)) if "cycle_start" in table else ():
-        fitted = table.isel(test=number, missing_dims="ignore")
-        echo("cycle  starts, s     Üy, m/s2       λ      Δμ      Kd")
-        rows = zip(*(fitted[f"cycle_{name}"].values for name in _OF_CYCLES), strict=True)
-        for at, (start, *found) in enumerate(rows, 1):
-            if math.isfinite(start):
-                echo("{:5d} {:10.4g} {:>12} {:>7} {:>7} {:>7}".format(at, start, *map(_number, found)))
+        fitted = table.isel(test=number, missing_dims="ignore")[[*_CYCLES]].to_dataframe().reset_index()
+        echo(_text(fitted[[*_CYCLES]].dropna(subset=["cycle_start"]).rename(columns=_CYCLES), index=False))
     constant = table.attrs["constant_friction"]
     echo(*(f"note: {finding}" for finding in table.attrs["findings"].splitlines() if finding != constant))
     echo("", text, *paths)
@@ -166,5 +145,25 @@ def _echo_coefficients(table: "xr.Dataset", *lines: str) -> None:
             echo(f"{kind + ' friction by statics':<28}{value:.3f}   95 %: {low:.3f} to {high:.3f}")
 
 
-def _number(value: float, form: str = ".3g") -> str:
-    return format(value, form) if math.isfinite(value) else "-"
+def _echo_parameters(table: "xr.Dataset") -> None:
+    """The parameters, their correlation, and the misfit of each channel in each test."""
+    import pandas as pd
+
+    from slipsweep.motion.shaking import RESPONSES
+    from slipsweep.studies.likelihood import SOUGHT
+
+    columns = ["value", "error", "95 % from", "to"]
+    rows = [[table[one], table[f"{one}_error"], *table[f"{one}_interval"]] for one in SOUGHT]
+    found = pd.DataFrame(rows, [f"{one} ({table[one].attrs['units']})" for one in SOUGHT], columns, dtype=float)
+    found.loc[found["error"] == math.inf, columns[:2]] = math.nan  # the data do not determine it
+    echo(_text(found), "correlation", _text(pd.DataFrame(table["correlation"].values, [*SOUGHT], [*SOUGHT])))
+    echo("misfit, root mean square, and in parts of the largest value")
+    for name in (one for one in RESPONSES if f"misfit_{one}" in table):
+        misfits, shares = (table[f"{kind}misfit_{name}"] for kind in ("", "relative_"))
+        pairs = zip(misfits.values.flat, shares.values.flat, strict=True)
+        parts = (f"{misfit:.2g} {misfits.attrs['units']}  {share:.1%}" for misfit, share in pairs)
+        echo(f"  {name:<24}{', '.join(parts)}")
+
+
+def _text(table: "pd.DataFrame", **options: bool) -> str:
+    return table.to_string(**options, float_format="{:.4g}".format, na_rep="-")

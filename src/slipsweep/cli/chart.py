@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated, Literal
 
-from slipsweep.cli import common, options
+from slipsweep.cli import options
 from slipsweep.cli.common import FIGURES, echo
 from slipsweep.cli.options import OUTPUT, File, Text, Texts, command, written
 from slipsweep.errors import InputError
@@ -74,7 +74,7 @@ def chart(
                 if together:
                     kinds.write_book(temporary, result, shown)
                 else:
-                    common.save(shown[0], temporary, path.suffix)
+                    kinds.save(shown[0], temporary, path.suffix)
             echo(path)
     echo(*(f"no {name}: {reason}" for name, reason in left_out.items()))
 

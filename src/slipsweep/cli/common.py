@@ -1,6 +1,5 @@
 """What commands share that write and print: outputs checked before anything is computed, runs, figures, summaries."""
 
-import io
 import shlex
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -10,14 +9,13 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from slipsweep.cli.options import Large, Paths, displacements
+from slipsweep.cli.options import Large, displacements
 from slipsweep.errors import InputError
 from slipsweep.files import outputs
 from slipsweep.model import variables
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure
 
     from slipsweep.files.jobs import Job
     from slipsweep.files.running import Report
@@ -27,14 +25,6 @@ if TYPE_CHECKING:
 
 #: Endings of figures.
 FIGURES = (".png", ".svg", ".pdf")
-
-
-def check_outputs(output: Paths, endings: Sequence[str], overwrite: bool, reads: Sequence[Path | int]) -> list[Path]:
-    """Refuse outputs that cannot be written, before anything is computed; return those that there are."""
-    paths = list(output or ())
-    outputs.check_endings(paths, endings)
-    outputs.check_outputs(paths, overwrite, reads=reads)
-    return paths
 
 
 def write_outputs(
@@ -60,14 +50,7 @@ def write_outputs(
                 from slipsweep.charts import kinds
 
                 figure = figure or kinds.figure_of(table)  # drawn once
-                save(figure, temporary, path.suffix)
-
-
-def save(figure: "Figure", path: Path, ending: str) -> None:
-    """Write a figure in the format of an ending."""
-    content = io.BytesIO()  # matplotlib's writers leave a traceback on a full disk
-    figure.savefig(content, format=ending[1:], dpi=150)
-    path.write_bytes(content.getvalue())
+                kinds.save(figure, temporary, path.suffix)
 
 
 def run_job(job: "Job", path: "Place", large: Large, unit: str = "cells") -> "Report":
@@ -98,29 +81,20 @@ def progress_bar(cells: int, quiet: bool, unit: str = "cells") -> Iterator[Calla
         yield None
         return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, ProgressColumn, Task, TaskProgressColumn, TimeRemainingColumn
-    from rich.table import Column
-    from rich.text import Text
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
     from slipsweep.jit import compiling
 
-    before = compiling.seconds
-
-    def advance(more: int) -> None:
-        bar.advance(task, more)
-        solving = (bar.tasks[task].elapsed or 0.0) - (compiling.seconds - before)
-        bar.update(task, description=f"{bar.tasks[task].completed / max(solving, 1e-9):.3g} {unit}/s")
-
-    class Doing(ProgressColumn):
-        """How fast cells are solved, or which kernel is compiled."""
-
-        def render(self, task: Task) -> Text:
-            now = compiling.compiled_now
-            return Text(f"compiling for this processor, once: {now}" if now else task.description)
-
-    columns = (BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), Doing(Column(no_wrap=True)))
+    columns = (BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), TextColumn("{task.description}"))
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=cells)
+        task, before = bar.add_task("", total=cells), compiling.seconds
+        compiling.announce = lambda kernel: bar.update(task, description=f"compiling {kernel}, once")
+
+        def advance(more: int) -> None:
+            bar.advance(task, more)
+            solving = (bar.tasks[task].elapsed or 0.0) - (compiling.seconds - before)
+            bar.update(task, description=f"{bar.tasks[task].completed / max(solving, 1e-9):.3g} {unit}/s")
+
         yield advance
 
 
@@ -156,14 +130,14 @@ def echo_tally(tally: "Tally") -> None:
         echo(f"displacement over Newmark's, where both slide: median {median}, 5 to 95 % {low} to {high}")
     if (indices := tally.indices) is None:
         return
+    import pandas as pd
+
     points, there = sum(indices.status.values()), indices.status[variables.SensitivityStatus.COMPUTED]
-    echo(f"Sobol indices of the permanent displacement, at {there} of {points} grid points:")
+    echo(f"Sobol indices of the permanent displacement, at {there} of {points} grid points, and their means:")
     if there:
-        width = max(24, *map(len, indices.total))
-        echo(f"  {'input (means)':<{width}}  first order   total   largest total at")
-        for name in sorted(indices.total, key=lambda name: -indices.total[name]):
-            first, total = indices.first[name], indices.total[name]
-            echo(f"  {name:<{width}}  {first:11.3f} {total:7.3f}   {indices.largest[name]:16d}")
+        columns = {"first order": indices.first, "total": indices.total, "largest total at": indices.largest}
+        rows = pd.DataFrame(columns).sort_values("total", ascending=False)
+        echo(rows.to_string(float_format="{:.3f}".format))
     for status, count in indices.status.items():
         if count and status is not variables.SensitivityStatus.COMPUTED:
             echo(f"  none at {count} ({status.name.lower()}): {status.text}")

@@ -1,25 +1,19 @@
 """`slipsweep hazard`: the mean annual rate at which a displacement is exceeded."""
 
-import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from slipsweep.cli import common, options
 from slipsweep.cli.common import FIGURES, echo
 from slipsweep.cli.options import command, written
 from slipsweep.errors import InputError
-
-if TYPE_CHECKING:
-    import xarray as xr
+from slipsweep.files import outputs
 
 #: What is needed of a result.
 _NEEDED = ("permanent_displacement", "validity", "exceedance_probability", "valueless_share")
 
 #: The part of a rate that is worth a sentence.
 _MUCH = 0.05
-
-#: A row of the table of rates.
-_ROW = "  {:<10}{:>12}{:>16}{:>14}{:>14}{:>16}"
 
 HAZARD = options.Panel("Hazard")
 
@@ -43,14 +37,13 @@ def hazard(
 
     From a hazard curve and the fragility under a suite of recorded motions, under uncertain inputs, or under both.
     """
-    import numpy as np
+    import xarray as xr
 
     from slipsweep.files.opening import read_result, values_text
     from slipsweep.files.selection import own_names, selected
-    from slipsweep.studies import suite_statistics
     from slipsweep.studies.hazard import displacement_hazard, fragility, openquake_fragility, read_hazard_curve
 
-    paths = common.check_outputs(output, (*FIGURES, ".xml"), overwrite, [file, curve])
+    paths = outputs.check_outputs(output, overwrite, reads=[file, curve], endings=(*FIGURES, ".xml"))
     whole = read_result(file)
     table = whole[[name for name in _NEEDED if name in whole]].load()
     if "g" not in table.attrs:
@@ -80,15 +73,16 @@ def hazard(
     first, last = max(low, start), min(high, end)
     echo(f"P(u > d | PGA): share over {rates.attrs['suite_dimensions'].replace(' ', ' and ')}")
     echo(f"amplitudes of the result {low:.4g} to {high:.4g} g, hazard curve {start:.4g} to {end:.4g} g")
-    # a share without a value may lie along fewer dimensions: it does not depend on the frequency
-    sizes = {dim: size for dim, size in rates["annual_rate"].sizes.items() if dim != "threshold"}
-    fixed = [f"{name} = {values_text(rates[name])}" for name in typed if name in rates.coords and name not in sizes]
-    for index, point in zip(np.ndindex(*sizes.values()), suite_statistics.point_names(rates, sizes), strict=True):
-        echo(*filter(None, [", ".join(filter(None, [point, *fixed]))]))
-        _summarize_point(rates.isel(dict(zip(sizes, index, strict=True))), first, last)
+    values = {name: rates[name] for name in typed if name in rates.coords and name not in rates.sizes}
+    echo(*(f"{name} = {values_text(value)}" for name, value in values.items()))
     rate, held, omitted = (rates[name] for name in ("annual_rate", "held_rate", "omitted_rate"))
     axis = "the axis amplitude of the sweep" if high < end else "the hazard curve"
+    missing, samples = rates["valueless_share"], "samples" in rates.attrs["suite_dimensions"]
+    unstable = "; samples that are statically unstable count as exceeding" if samples else ""
     notes = {
+        f"up to {missing.max():.1%} have no value at an amplitude: left out of P{unstable}": missing > 0.0,
+        "without an annual rate: fewer than two amplitudes have a value": rate.isnull(),
+        "annual rate 0: the displacement is not exceeded at any amplitude of the result": rate == 0.0,
         f"above {last:.4g} g P(u > d) is taken as it is there: to compute it, extend {axis}": held > _MUCH * rate,
         f"below {first:.4g} g nothing is counted: to compute it, begin the axis amplitude lower": omitted
         > _MUCH * rate,
@@ -97,26 +91,15 @@ def hazard(
         "P(u > d) grows much from one amplitude to the next: the rates may be wrong by the factors above; put more "
         "values on the axis amplitude": (rates["upper_rate"] > 2.0 * rates["lower_rate"]) & (held < rate),
     }
+    exceeded = rate.where(rate > 0.0)
+    columns = {
+        "annual rate": rate,
+        "period (years)": 1.0 / exceeded,
+        "steps, from": rates["lower_rate"] / exceeded,
+        "to": rates["upper_rate"] / exceeded,
+        f"above {last:.3g} g": held / exceeded,
+        f"below {first:.3g} g": omitted / exceeded,
+    }
+    table = xr.Dataset(columns).rename(threshold="d (m)").to_dataframe()[[*columns]]
+    echo(table.to_string(float_format="{:.4g}".format, na_rep="-"))
     echo(*(text for text, holds in notes.items() if holds.any()), *paths)
-
-
-def _summarize_point(rates: "xr.Dataset", first: float, last: float) -> None:
-    """The table of one grid point."""
-    share = rates["valueless_share"].item()
-    if share > 0.0:
-        what = "motions" if rates.attrs["suite_dimensions"].split()[-1] != "samples" else "samples"
-        unstable = "; those that are statically unstable count as exceeding" if what == "samples" else ""
-        echo(f"  up to {share:.1%} of the {what} have no value at an amplitude: left out of P{unstable}")
-    if rates["annual_rate"].isnull().any():
-        echo("  no annual rate: fewer than two amplitudes have a value")
-        return
-    above, below = f"above {last:.3g} g", f"below {first:.3g} g"
-    echo(_ROW.format("d (m)", "annual rate", "period (years)", "steps", above, below))
-    names = ("threshold", "annual_rate", "lower_rate", "upper_rate", "held_rate", "omitted_rate")
-    for d, rate, *parts in zip(*(rates[name].values for name in names), strict=True):
-        if not rate > 0.0:
-            echo(f"  {d:<10.6g}{0:>12}  not exceeded at any amplitude of the result")
-            continue
-        lower, upper, held, omitted = (part / rate for part in parts)
-        steps, left = f"{lower:.2f} to {upper:.2f}", "not known" if math.isnan(omitted) else f"<= {omitted:.2%} more"
-        echo(_ROW.format(f"{d:.6g}", f"{rate:.4g}", f"{1.0 / rate:.4g}", steps, f"{held:.2%}", left))

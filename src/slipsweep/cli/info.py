@@ -8,6 +8,7 @@ from slipsweep.cli import common, options
 from slipsweep.cli.common import echo
 from slipsweep.cli.options import Text, Texts, command
 from slipsweep.errors import InputError
+from slipsweep.files import outputs
 
 TABLE = options.Panel("Table")
 
@@ -74,7 +75,7 @@ def export(
     if output.suffix == ".xml":
         from slipsweep.studies.hazard import fragility, openquake_fragility
 
-        paths = common.check_outputs([output], (".xml",), overwrite, [Path(file)])
+        paths = outputs.check_outputs([output], overwrite, reads=[Path(file)], endings=(".xml",))
         # P(u > d) along the axis amplitude, of the values that --at takes of others
         chosen = selection.selected(opening.read_result(file), file, options.cuts(at), ("motion", "quantile"))
         common.write_outputs(paths, overwrite, chosen, xml=lambda: openquake_fragility(fragility(chosen)))

@@ -1,6 +1,5 @@
 """`slipsweep limit`: the amplitude at which a tolerable displacement is reached."""
 
-from collections.abc import Hashable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -8,6 +7,7 @@ from slipsweep.cli import common, options
 from slipsweep.cli.common import FIGURES, echo
 from slipsweep.cli.options import Large, Text, Texts, read, written
 from slipsweep.errors import InputError
+from slipsweep.files import outputs
 from slipsweep.model.units import quantity
 from slipsweep.model.variables import LimitStatus
 
@@ -44,7 +44,7 @@ def limit(
             raise InputError(f"--{name}: needs -o OUT.nc, whose chunks are solved and written one after the other")
     checked = spec.load(sweep)
     named = [Path(one) for one in output or () if one not in results]
-    figures = common.check_outputs(named, (*FIGURES, ".nc", ".zarr"), large.overwrite, checked.files)
+    figures = outputs.check_outputs(named, large.overwrite, reads=checked.files, endings=(*FIGURES, ".nc", ".zarr"))
     g = checked.model.g
     lengths = options.displacements(displacement, g)
     highest = None if maximum_amplitude is None else quantity("--maximum-amplitude", maximum_amplitude, "m s-2", g)
@@ -75,25 +75,23 @@ def limit(
 
 
 def _summarize_suite(table: "xr.Dataset", g: float) -> None:
-    """Print the limit of each motion, and the suite's quantiles, at every grid point."""
+    """Print the suite's quantiles at every grid point, and the limit of each motion."""
+    import numpy as np
+    import pandas as pd
+
     from slipsweep.studies.suite_statistics import limit_quantiles, point_names, suite_dims
 
-    def text(value: float) -> str:
-        return f"{value:.6g} ({value / g:.4g})" if abs(value) < float("inf") else "none"
-
-    limits, found = table["limit_amplitude"], limit_quantiles(table)
-    grid = found["value_count"].sizes
-    suite: dict[Hashable, int] = {dim: limits.sizes[dim] for dim in suite_dims(limits)}
-    points, names = point_names(table, grid), point_names(table, suite)
-    each = limits.transpose(*grid, *suite).values.reshape(len(points), -1)
-    quantiles = found["limit_quantile"].values.reshape(len(points), -1)
-    counts, beyond = (found[name].values.ravel() for name in ("value_count", "not_reached_count"))
-    width = max(24, *map(len, names))
-    echo("16 %, median and 84 % of the suite, m/s2 (g); a limit not reached is larger than all others:")
-    for at, point in enumerate(points[:_MOST_POINTS]):
-        of = f"of {counts[at]}" + (f", {beyond[at]} of them not reached" if beyond[at] else "")
-        echo(f"  {point + ': ' if point else ''}{', '.join(map(text, quantiles[at]))} {of}")
-        for name, value in zip(names, each[at], strict=True) if each.size <= _MOST_MOTIONS else ():
-            echo(f"    {name.removeprefix('motion = '):<{width}}{text(value)}")
+    limits, found = table["limit_amplitude"] / g, limit_quantiles(table)
+    grid, suite = found["value_count"].sizes, {dim: limits.sizes[dim] for dim in suite_dims(limits)}
+    points = point_names(table, grid)
+    quantiles = found["limit_quantile"].transpose(*grid, ...).values.reshape(len(points), -1) / g
+    rows = pd.DataFrame(quantiles, points, ["16 %", "median", "84 %"]).replace(np.inf, np.nan)
+    rows["motions"], rows["not reached"] = (found[f"{name}_count"].values.ravel() for name in ("value", "not_reached"))
+    echo("limits of the suite, g; one that is not reached is larger than all others:")
+    echo(rows.head(_MOST_POINTS).to_string(float_format="{:.4g}".format, na_rep="none"))
     if len(points) > _MOST_POINTS:
-        echo(f"  and {len(points) - _MOST_POINTS} grid points more")
+        echo(f"and {len(points) - _MOST_POINTS} grid points more")
+    if limits.size <= _MOST_MOTIONS:
+        each = pd.DataFrame(limits.transpose(*suite, *grid).values.reshape(-1, len(points)), point_names(table, suite))
+        echo("limits of the motions, g, at each grid point:")
+        echo(each.to_string(header=False, float_format="{:.4g}".format, na_rep="none"))

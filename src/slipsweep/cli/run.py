@@ -14,15 +14,9 @@ from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files import outputs
 from slipsweep.model import variables
 from slipsweep.model.options import SOLVERS
-from slipsweep.model.variables import SlidingMode
 
 if TYPE_CHECKING:
-    import xarray as xr
-
-    from slipsweep.grid.tally import Tally
-
-#: Cells, about, that are looked at for trends that no block has.
-_LOOKED_AT = 5000
+    pass
 
 
 @options.command("Start", "slipsweep example", "slipsweep example paper")
@@ -72,6 +66,7 @@ def run(
     large: Large,
 ) -> None:
     """Compute a sweep and write it to a netCDF file or a Zarr store."""
+    from slipsweep.charts import solved
     from slipsweep.files import jobs, opening, spec, storing
     from slipsweep.grid.resources import grid_text, size_text
     from slipsweep.jit import compiling
@@ -117,47 +112,7 @@ def run(
         echo(f"the same motion under several labels: {template.attrs['duplicate_motions']}")
     common.echo_tally(report.tally)
     result = opening.read_result(report.path)
-    echo(*filter(None, (_why_nothing_slides(template, report.tally), _unsound_text(result))))
+    echo(*filter(None, [solved.why_nothing_slides(template, report.tally)]))
+    echo(*(f"unsound: {text}" for text in solved.unsound_texts(result)))
     common.echo_suite(result, most=20)
     echo(f"{report.path}  {size_text(storing.nbytes_of(report.path))}")
-
-
-def _unsound_text(table: "xr.Dataset") -> str:
-    """How many sliding cells have a trend that no block has, and how many slide continuously with estimated friction.
-
-    Of many cells some, evenly spaced, are looked at.
-    """
-    from slipsweep.charts import solved
-
-    moved, drives = table.get(solved.DISPLACEMENT), {*variables.STRENGTHS, "displacement_amplitude"}
-    if moved is None or drives.isdisjoint(table.coords) or solved.is_newmark(table):
-        return ""
-    each = math.ceil((moved.size / _LOOKED_AT) ** (1.0 / max(moved.ndim, 1)))
-    some = table.thin(dict.fromkeys(moved.dims, each)).load()
-    drawn = solved.reliable(some, solved.DISPLACEMENT)
-    _, trends = solved.unsound(some.assign({solved.DISPLACEMENT: drawn}), drawn, solved.newmark(some))
-    estimated = ""
-    if {"sliding_mode", "validity"} <= {*some}:
-        estimated = solved.estimated(some, drawn, some["sliding_mode"] == SlidingMode.CONTINUOUS)
-    return "\n".join(f"unsound: {text}" for text in (trends, estimated) if text)
-
-
-def _why_nothing_slides(table: "xr.Dataset", tally: "Tally") -> str:
-    """The likely reason why every cell is stuck or has no value; empty where one slides."""
-    modes, g, coords = tally.modes or {}, float(table.attrs["g"]), table.coords
-    if not modes or modes[SlidingMode.STICK_SLIP] + modes[SlidingMode.CONTINUOUS]:
-        return ""
-    if not modes[SlidingMode.STUCK]:
-        flags = {flag: count for flag, count in (tally.flags or {}).items() if flag in variables.VALUELESS}
-        why = max(flags, key=lambda flag: flags[flag]).text if flags else "validity is not among the variables"
-        mu_s = float(coords["mu_s"].min()) if "mu_s" in coords else 0.0
-        is_angle = mu_s > 3.0 and "phi" not in coords
-        return f"no cell has a value: {why}" + (f"; did you mean phi = {mu_s:.6g}?" if is_angle else "")
-    if not {"amplitude", "theta", "mu_s"} <= {*coords}:
-        return "no cell slides"
-    coulomb = g * math.tan(math.atan(coords["mu_s"].min()) - math.radians(coords["theta"].max()))
-    least = float(coords["yield_acceleration"].min()) if "yield_acceleration" in coords else coulomb
-    largest = float(coords["amplitude"].max())
-    hint = '; did you mean units = "g"?' if largest <= 3.0 and largest * g > least else ""
-    texts = (range_text("amplitude", (one,), g) for one in (largest, least))
-    return "no cell slides: largest amplitude {}, smallest yield acceleration {}".format(*texts) + hint

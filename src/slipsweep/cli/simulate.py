@@ -9,6 +9,7 @@ from slipsweep.cli import common, options
 from slipsweep.cli.common import echo, range_text
 from slipsweep.cli.options import BLOCK, OUTPUT, RARE, SHAKING, File, Text
 from slipsweep.errors import InputError, RunError
+from slipsweep.files import outputs
 from slipsweep.model import variables
 from slipsweep.model.options import MODELS, Model
 from slipsweep.motion.reading import Reading
@@ -64,7 +65,9 @@ def simulate(
     quiet: options.Quiet = False,
 ) -> None:
     """Compute the time history of one case, as files and a figure."""
-    paths = common.check_outputs(output, (".nc", ".csv", *common.FIGURES), overwrite, [record] if record else [])
+    paths = outputs.check_outputs(
+        output, overwrite, reads=[record] if record else [], endings=(".nc", ".csv", *common.FIGURES)
+    )
     with_unit = options.in_own_units(vars(typed), model.g)
     taken = (f"{name.replace('_', ' ')} {range_text(name, (value,), model.g)}" for name, value in with_unit.items())
     taken_as = ", ".join(taken)

@@ -7,7 +7,7 @@ import itertools
 import os
 import secrets
 import shutil
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from slipsweep.grid.resources import size_text
 EXISTS = "{path}: exists already; give --overwrite to replace it, or another name with -o"
 
 
-def check_endings(paths: Sequence[Path | str], endings: Collection[str]) -> None:
+def check_endings(paths: Iterable[Path | str], endings: Collection[str]) -> None:
     """Refuse outputs whose names end in what the command cannot write (InputError)."""
     for path in paths:
         if Path(path).suffix not in endings:
@@ -26,12 +26,17 @@ def check_endings(paths: Sequence[Path | str], endings: Collection[str]) -> None
             raise InputError(f"{path}: the name must end in {one_of}{', '.join(endings)}")
 
 
-def check_outputs(paths: Sequence[Path], overwrite: bool, *, reads: Sequence[Path | int]) -> None:
-    """Refuse outputs of a command that cannot be written, may not be replaced, or are what it `reads` (InputError).
+def check_outputs(
+    output: Iterable[Path] | None, overwrite: bool, *, reads: Sequence[Path | int], endings: Collection[str] = ()
+) -> list[Path]:
+    """The outputs of a command, none that cannot be written, may not be replaced, or is what it `reads` (InputError).
 
     Every command that writes comes here before it computes anything.  What it reads are files, or 0, standard input.
     Files are compared, not their names: a link is what it points to.
     """
+    paths = list(output or ())
+    if endings:
+        check_endings(paths, endings)
     for path in paths:
         try:
             for read in reads:
@@ -53,6 +58,7 @@ def check_outputs(paths: Sequence[Path], overwrite: bool, *, reads: Sequence[Pat
     for path, other in itertools.combinations(paths, 2):
         if path.absolute() == other.absolute():
             raise InputError(f"{other}: is given twice as an output of this command; give each another name")
+    return paths
 
 
 @contextmanager

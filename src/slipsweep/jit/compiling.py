@@ -34,9 +34,9 @@ _KEPT = 4
 #: Seconds to wait for another process that compiles.
 _PATIENCE = 300.0
 
-#: Seconds that this process has spent compiling, and the kernel that it compiles now.
+#: Seconds that this process has spent compiling, and what is called with a kernel's name before it is compiled.
 seconds = 0.0
-compiled_now: str | None = None
+announce: Callable[[str], object] = str
 
 _compiling = threading.Lock()
 
@@ -78,7 +78,7 @@ def _compiled(function: Callable[..., Any], types: tuple[Any, ...]) -> Any:
 
 
 def _compiled_in(folder: Path | None, function: Callable[..., Any], types: tuple[Any, ...]) -> Any:
-    global seconds, compiled_now
+    global seconds
     given, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
     try:
         compiled: Any = part("arcp", cache=folder is not None)(function)
@@ -87,11 +87,10 @@ def _compiled_in(folder: Path | None, function: Callable[..., Any], types: tuple
     if folder is not None and any(folder.glob(f"**/*.{function.__name__}-*.nbi")):
         compiled.compile(types)
         return compiled
-    started, compiled_now = time.perf_counter(), function.__name__
-    try:
-        compiled.compile(types)
-    finally:
-        seconds, compiled_now = seconds + time.perf_counter() - started, None
+    announce(function.__name__)
+    started = time.perf_counter()
+    compiled.compile(types)
+    seconds += time.perf_counter() - started
     return compiled
 
 

@@ -254,7 +254,7 @@ def labels_along(data: xr.Dataset, dim: Hashable, factor: float = 1.0) -> list[s
     return [str(one) if values.dtype.kind not in "iuf" else f"{one * factor:.4g}" for one in values]
 
 
-def point_names(data: xr.Dataset, sizes: Mapping[Hashable, int]) -> list[str]:
+def point_names(data: xr.Dataset, sizes: Mapping[Any, int]) -> list[str]:
     """What each point of a grid is called, in order: ``theta = 5, mu_s = 0.3``."""
     along = ([f"{dim} = {label}" for label in labels_along(data, dim)] for dim in sizes)
     return [", ".join(parts) for parts in itertools.product(*along)]
