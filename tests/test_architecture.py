@@ -21,7 +21,7 @@ ORDER = (
 LINES = {
     "jit": 315,
     "model": 1_365,
-    "motion": 1_895,
+    "motion": 1_814,
     "kernels": 3_150,
     "grid": 1_050,
     "studies": 3_885,

@@ -131,12 +131,9 @@ def _pieces(waveform: Waveform, n: int) -> tuple[Exact, ...]:
 
 def _ramped(plain: Derivative, low: float, scale: Any, rate: Any) -> Derivative:
     """A wave times its ramp, a straight line: `scale` at `low`, and of slope `rate` by phase."""
-
-    def derivative(u: Exact, order: int) -> Exact:
-        ramp = scale + rate * (np.asarray(u, _Extended) - low) * _TURN
-        return np.asarray(ramp * plain(u, order) + order * rate * plain(u, order - 1))
-
-    return derivative
+    return lambda u, order: (
+        (scale + rate * (u - _Extended(low)) * _TURN) * plain(u, order) + order * rate * plain(u, order - 1)
+    )
 
 
 def _monotone_pieces(derivative: Derivative, fastest: int, low: float, high: float) -> tuple[Exact, ...]:

@@ -8,15 +8,13 @@ acceleration but what `baseline` took off when it was read.  "g" is standard gra
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import scipy  # its parts are loaded where they are used: a sweep under a waveform does not wait for them
 from numpy.typing import NDArray
 
 from slipsweep.motion.reading import STANDARD_GRAVITY
-
-if TYPE_CHECKING:
-    from scipy.interpolate import PPoly
 
 Floats = NDArray[np.float64]
 
@@ -82,15 +80,13 @@ def cumulative_absolute_velocity(times: Floats, acceleration: Floats) -> float:
 
 def significant_duration(times: Floats, acceleration: Floats) -> float:
     """Time between 5 % and 95 % of the Arias intensity, s (Trifunac and Brady 1975)."""
-    from scipy.optimize import brentq
-
-    energy, (first, last) = _energy(times, acceleration), (times[0], times[-1])
-    total = float(energy(last))
+    energy, ends = _energy(times, acceleration), (times[0], times[-1])
+    total = float(energy(times[-1]))
     if not total > 0.0:
         return 0.0
 
     def reached(share: float) -> float:
-        return brentq(lambda time: float(energy(time)) - share * total, first, last, xtol=1e-15 * (last - first))
+        return scipy.optimize.brentq(lambda time: float(energy(time)) - share * total, *ends, xtol=1e-15 * np.ptp(ends))
 
     return reached(0.95) - reached(0.05)
 
@@ -123,26 +119,24 @@ def spacing_of(times: Floats) -> Floats:
     return np.full(times.size - 1, (times[-1] - times[0]) / (times.size - 1)) if is_even else np.diff(times)
 
 
-def _lines(times: Floats, acceleration: Floats) -> "PPoly":
+def _lines(times: Floats, acceleration: Floats) -> "scipy.interpolate.PPoly":
     """The straight lines between the samples."""
-    from scipy.interpolate import PPoly  # only here: a sweep under a waveform does not wait for it
-
     slope = np.diff(acceleration) / np.diff(times)
-    return PPoly(np.array([slope, acceleration[:-1]]), times)
+    return scipy.interpolate.PPoly(np.array([slope, acceleration[:-1]]), times)
 
 
-def _energy(times: Floats, acceleration: Floats) -> "PPoly":
+def _energy(times: Floats, acceleration: Floats) -> "scipy.interpolate.PPoly":
     """∫ Üg² dt over time."""
     lines = _lines(times, acceleration)
     slope, first = lines.c
     return type(lines)(np.array([slope * slope, 2.0 * slope * first, first * first]), lines.x).antiderivative()
 
 
-def _zeros(curve: "PPoly") -> Floats:
+def _zeros(curve: "scipy.interpolate.PPoly") -> Floats:
     """Where a curve is zero; a piece that is zero throughout has none."""
     found = curve.roots(discontinuity=False, extrapolate=False)
     return found[np.isfinite(found)]
 
 
-def _largest(curve: "PPoly", derivative: "PPoly") -> float:
+def _largest(curve: "scipy.interpolate.PPoly", derivative: "scipy.interpolate.PPoly") -> float:
     return float(np.abs(curve(np.concatenate([curve.x, _zeros(derivative)]))).max())

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError, did_you_mean
@@ -82,10 +83,9 @@ class Pair:
 
     def rotated(self, azimuth: float) -> Record:
         """The component at an azimuth, degrees from the first towards the second, exact between samples as at them."""
-        from scipy.special import cosdg, sindg  # exact at the quarters of a turn
-
         degrees = check_single("azimuth", azimuth)
-        acceleration = cosdg(degrees) * self.first.acceleration + sindg(degrees) * self.second.acceleration
+        first, second = scipy.special.cosdg(degrees), scipy.special.sindg(degrees)  # exact at the quarters of a turn
+        acceleration = first * self.first.acceleration + second * self.second.acceleration
         return Record(self.times, acceleration, f"{self.name} at {degrees:g} degrees", self.attrs)
 
 
@@ -139,11 +139,9 @@ class Suite:
             raise InputError(f"motions: {len(motions)}: must be one at least, all Records or all Pairs")
         labels = tuple(check_list("labels", self.labels, "texts"))
         labels = labels or tuple(_labels([Path(_components(one)[0].name) for one in motions]))
-        for label in labels:
-            if not isinstance(label, str) or not label.strip() or not label.isprintable():
-                raise InputError(f"labels: {shown(label)}: must be a text that can be printed")
-        if len(labels) != len(motions) or len({*labels}) < len(labels):
-            raise InputError(f"labels = {shown(labels)}: must be one for each of {len(motions)}, and all different")
+        texts = {one for one in labels if isinstance(one, str) and one.strip() and one.isprintable()}
+        if not len(motions) == len(labels) == len(texts):
+            raise InputError(f"labels = {shown(labels)}: must be {len(motions)} different texts that can be printed")
         object.__setattr__(self, "motions", motions)
         object.__setattr__(self, "labels", labels)
 
@@ -185,8 +183,7 @@ class Suite:
         """Labels of motions that have the same samples, such as one file under two names."""
         alike = defaultdict[bytes, list[str]](list)
         for label, motion in zip(self.labels, self, strict=True):
-            samples = b"".join(one.acceleration.tobytes() + one.times.tobytes() for one in _components(motion))
-            alike[samples].append(label)
+            alike[b"".join(bytes(one.acceleration) + bytes(one.times) for one in _components(motion))].append(label)
         return tuple(tuple(labels) for labels in alike.values() if len(labels) > 1)
 
     @cached_property
@@ -202,10 +199,10 @@ class Suite:
 
     def intensities(self, places: NDArray[np.int64], azimuths: Floats) -> dict[str, Floats]:
         """Intensity measures of the motions at some places, each at its azimuth; the arrays have one shape."""
-        both, shape = zip(places.flat, azimuths.flat, strict=True), azimuths.shape
-        records = [self.record(int(at), float(azimuth)) for at, azimuth in both]
-        cells = [intensity_measures(one.times, one.acceleration) for one in records]
-        return {f"motion_{name}": np.reshape([cell[name] for cell in cells], shape) for name in INTENSITY_MEASURES}
+        records = np.vectorize(self.record, otypes=[object])(places, azimuths)
+        cells = [intensity_measures(one.times, one.acceleration) for one in records.flat]
+        found = {name: np.reshape([cell[name] for cell in cells], records.shape) for name in INTENSITY_MEASURES}
+        return {f"motion_{name}": values for name, values in found.items()}
 
     def record(self, at: int, azimuth: float) -> Record:
         """The motion at a place, of a pair the component at an azimuth."""
@@ -216,10 +213,8 @@ class Suite:
     def attrs(self) -> dict[str, Any]:
         """What results say of the suite: how many motions, and how they were read where all were read alike."""
         about: dict[str, Any] = {"suite": self.name, "motions": len(self)}
-        for name in ("record_format", "record_units", "baseline"):
-            values = {one.attrs.get(name) for one in self.components}
-            if len(values) == 1 and None not in values:
-                about[name] = values.pop()
+        common = dict(set.intersection(*({*one.attrs.items()} for one in self.components)))
+        about |= {name: common[name] for name in ("record_format", "record_units", "baseline") if name in common}
         if self.duplicates:
             about["duplicate_motions"] = "; ".join(", ".join(labels) for labels in self.duplicates)
         return about
@@ -279,8 +274,7 @@ def read_suite(
     >>> slipsweep.read_suite("sweeps/data/suite", pairs=("_H1", "_H2"))
     Suite('sweeps/data/suite': 4 pairs: rock-far, rock-near, soft-far, stiff-pulse)
     """
-    reading = Reading(units, interval, baseline, gaps, implausible, format, channel)
-    return suite_in(Path(), paths, pairs, reading)
+    return suite_in(Path(), paths, pairs, Reading(units, interval, baseline, gaps, implausible, format, channel))
 
 
 def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Reading) -> Suite:
@@ -297,11 +291,9 @@ def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Rea
     if reasons:
         names = ", ".join(part.name for part in reasons)
         refused = InputError(f"{len(reasons)} of {len(reasons) + len(records)} files cannot be read: {names}")
-        for reason in reasons.values():
-            refused.add_note(reason)
+        refused.__notes__ = [*reasons.values()]
         raise refused
-    found = [[records[part] for part in source] for source in sources]
-    motions = tuple(Pair(*parts) if len(parts) == 2 else parts[0] for parts in found)
+    motions = tuple(Pair(*(records[part] for part in one)) if len(one) == 2 else records[one[0]] for one in sources)
     entry = paths[0] if isinstance(paths, (list, tuple)) and len(paths) == 1 else paths
     return Suite(motions, labels, str(entry) if isinstance(entry, (str, Path)) else "suite")
 
