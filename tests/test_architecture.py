@@ -19,13 +19,13 @@ ORDER = (
 #: Lines that a folder may have, docstrings and blanks among them.  More is a reason to look for the simpler thing;
 #: whoever takes something away lowers the limit.
 LINES = {
-    "jit": 315,
-    "model": 1_365,
-    "motion": 1_895,
+    "jit": 310,
+    "model": 1_360,
+    "motion": 1_831,
     "kernels": 3_150,
     "grid": 1_050,
     "studies": 3_885,
-    "files": 1_880,
+    "files": 1_875,
     "charts": 2_465,
     "explore": 665,
     "cli": 1_260,

@@ -18,7 +18,7 @@ from slipsweep.kernels.step import solve_cell
 from slipsweep.model.friction import FrictionLaw
 from slipsweep.model.variables import VALUELESS, Validity
 from slipsweep.motion.cutting import wave_of
-from slipsweep.motion.pieces import RECTANGLE, SIMPSON, TRAPEZOID, Steps, own_steps, steps_of
+from slipsweep.motion.pieces import RECTANGLE, SIMPSON, TRAPEZOID, Steps, steps_of
 from slipsweep.motion.waveforms import Sine, Square, Triangle, Waveform
 from tests.support.cases import Case, Found, choices, read_cases
 from tests.support.cases import solve as by_sweeps
@@ -256,7 +256,7 @@ class Hyperbolic:
     def found(self, rule: str, steps_per_cycle: int, cycles: int, recoupling: str = "eq12") -> Motion:
         cell = Cell(self.tangent, self.mu_s, self.amplitude, self.least, self.decay_rate, 0.0, np.nan)
         wave = wave_of(Sine(cycles=cycles))
-        steps = own_steps(steps_of(wave, RULES[rule], steps_per_cycle))
+        steps = steps_of(wave, RULES[rule], steps_per_cycle)
         options = Options(MONOTONE, EQ12 if recoupling == "eq12" else INTEGRATE, cycles, wants_peak=True, g=G)
         return solve_hyperbolic(cell, options, wave, steps)
 

@@ -90,7 +90,7 @@ def test_baseline() -> None:
     [
         ("a.csv", "0,1\n1,2\n", {}, "units: must be given"),
         ("a.csv", "time (ms),a (g)\n0,1\n1,2\n", {}, "time in ms: must be in s"),
-        ("a.csv", "t,a (g)\n0,1\n1,2\n", {"units": "gal"}, "the file itself says 'g'; correct its header"),
+        ("a.csv", "t,a (g)\n0,1\n1,2\n", {"units": "gal"}, "the file itself says 'g'; correct it"),
         ("a.csv", "0,1\n1,x\n", {"units": "g"}, "line 2: '1,x'"),
         ("a.csv", "0,1\n1,\n", {"units": "g"}, "first at t = 1 s"),
         ("a.csv", "0,1\n1,1\n1,2\n", {"units": "g"}, "time of sample 3 = 1: must be greater than 1"),
@@ -228,7 +228,7 @@ def test_cosmos_with_several_channels(tmp_path: Path) -> None:
     other = first.replace("   0.03630", "  77.00000")
     velocity = first.replace("       1       1       4     120", "       2       2       5     120")
     path = write(tmp_path, "three.V2", first[:end] + pts + first[end:] + velocity + other)
-    with pytest.raises(InputError, match="holds 2 channels of acceleration: give channel"):
+    with pytest.raises(InputError, match="channel = None: must be one of its 2 channels of acceleration"):
         read_record(path)
     found = [read_record(path, channel=number) for number in (1, 2)]
     assert [float(record.acceleration[0]) for record in found] == pytest.approx([0.000363, 0.77], rel=1e-15)
@@ -239,7 +239,11 @@ def test_cosmos_with_several_channels(tmp_path: Path) -> None:
     ("old", "new", "message"),
     [
         ("       1       1       4     120", "       0       1      50     120", "code 50 for the unit"),
-        ("       1       1       4     120", "       1       2       5     120", "it holds 0 channels of acceleration"),
+        (
+            "       1       1       4     120",
+            "       1       2       5     120",
+            "channel = None: must be one of its 0 channels",
+        ),
         ("     5.000000     0.050000", "  -999.000000     0.050000", "sampling interval -0.999"),
         ("      10 acceleration", "      11 acceleration", "10 values, where 11 are announced"),
         ("-100.00001", "-100.0x001", "must be numbers, 10 columns each"),

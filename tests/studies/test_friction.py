@@ -160,13 +160,13 @@ ROWS = "".join(f"{i / 100},{math.sin(i)},{math.sin(i)}\n" for i in range(20))
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "no column time: must name its columns"),
-        (ROWS, "no column time"),
+        ("", r"0 columns of time: must be one, as in time \(s\), table acceleration"),
+        (ROWS, "0 columns of time"),
         (HEAD.replace(" (m/s2),", ","), r"'table acceleration': must give its unit in brackets"),
         (HEAD.replace("(m/s2),", "(mm),") + ROWS, r"must be a unit that converts to m s-2"),
         (HEAD + ROWS.replace("0.05,", "0.04,"), "time of sample 6 = 0.04: must be greater than 0.04"),
         (HEAD + "\n".join([*ROWS.splitlines(), "9,0,0"]), "no samples from t = 0.19 to 9 s"),
-        (HEAD + "0,1,one\n", "line 2: block_acceleration = 'one': must be a number"),
+        (HEAD + "0,1,one\n", "line 2: '0,1,one': must be 3 cells, and a number, or nothing, for time"),
         (HEAD.replace(",block acceleration", ",temperature") + ROWS, "block_acceleration: missing: Eq. 1 needs"),
     ],
 )
@@ -183,7 +183,7 @@ def test_files_that_are_no_tests(text: str, message: str, tmp_path: Path) -> Non
         ({"theta": -1.0}, "theta = -1"),
         ({"threshold": 0.0}, "threshold = 0.0: must be"),
         ({"offset": "friction"}, "offset = 'friction': must be 'all'"),
-        ({"offset": "all", "rest": (5.0, 6.0)}, "rest = .*: 0 samples lie between"),
+        ({"offset": "all", "rest": (5.0, 6.0)}, "rest = .*: 0 samples to fit to"),
         ({"theta": 80.0}, "the block would lift off"),
     ],
 )

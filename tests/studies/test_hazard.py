@@ -195,10 +195,10 @@ def test_a_file_of_openquake(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "no column PGA: must name its columns, such as PGA (g)"),
+        ("", "line 1: 0 columns of PGA: must be one, as in PGA (g), annual rate"),
         ("PGA (mm), annual rate\n1,2\n", 'unit = "mm": must be a unit that converts to m s-2'),
         ("PGA (g), annual probability\n1,2\n", "must be an annual rate, -ln(1 - p)"),
-        ("PGA (g), annual rate\n0.1,x\n", "line 2: annual rate = 'x': must be a number"),
+        ("PGA (g), annual rate\n0.1,x\n", "line 2: '0.1,x': must be 2 cells, and a number, or nothing, for PGA"),
         ("PGA (m/s2), annual rate\n1,0.02\n1,0.01\n", "amplitude of point 2 = 1: must be > 0, and greater than"),
         ("PGA (m/s2), annual rate\n1,0.02\n2,0\n", "rate of point 2 = 0: must be > 0"),
     ],

@@ -160,8 +160,8 @@ def _echo_parameters(table: "xr.Dataset") -> None:
     echo("misfit, root mean square, and in parts of the largest value")
     for name in (one for one in RESPONSES if f"misfit_{one}" in table):
         misfits, shares = (table[f"{kind}misfit_{name}"] for kind in ("", "relative_"))
-        pairs = zip(misfits.values.flat, shares.values.flat, strict=True)
-        parts = (f"{misfit:.2g} {misfits.attrs['units']}  {share:.1%}" for misfit, share in pairs)
+        units, pairs = misfits.attrs["units"], zip(misfits.values.flat, shares.values.flat, strict=True)
+        parts = (f"{one:.2g} {units}  {share:.1%}" if one == one else "not measured" for one, share in pairs)
         echo(f"  {name:<24}{', '.join(parts)}")
 
 

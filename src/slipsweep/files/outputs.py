@@ -41,10 +41,8 @@ def check_outputs(
         try:
             for read in reads:
                 if os.path.exists(path) and os.path.exists(read) and os.path.samestat(os.stat(path), os.stat(read)):
-                    raise InputError(
-                        f"{path}: writing it would replace {read or 'standard input'}, which this command reads; give "
-                        "another name with -o"
-                    )
+                    own = f"{read or 'standard input'}, which this command reads"
+                    raise InputError(f"{path}: writing it would replace {own}; give another name with -o")
             if not path.parent.is_dir():
                 raise InputError(f"{path}: the folder {path.parent} does not exist")
             if not os.access(path.parent, os.W_OK):

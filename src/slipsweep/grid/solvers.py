@@ -75,15 +75,15 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
             results[:, left] = found
 
     if isinstance(motion, Record):
-        recorded = cutting.wave_of_record(motion, polarity)
-        return Solver(
-            lambda cells, results: solve_record(cells, options, recorded, workspace_of(recorded), results), ROWS
-        )
+        wave = cutting.wave_of_record(motion, polarity)
+        return Solver(lambda cells, results: solve_record(cells, options, wave, workspace_of(wave), results), ROWS)
     assert isinstance(motion, Waveform)
     if isinstance(problem.solver, Step):
-        wave = cutting.wave_of(motion)
-        steps = pieces.steps_of(wave, RULES[problem.solver.rule], problem.solver.steps_per_cycle)
-        return Solver(lambda cells, results: solve_steps(cells, options, wave, pieces.own_steps(steps), results), ROWS)
+        wave, rule, count = cutting.wave_of(motion), RULES[problem.solver.rule], problem.solver.steps_per_cycle
+        # each call has steps of its own, which hold a workspace
+        return Solver(
+            lambda cells, results: solve_steps(cells, options, wave, pieces.steps_of(wave, rule, count), results), ROWS
+        )
     return Solver(under_sine if is_plain_sine(motion) else under_wave, ROWS)
 
 

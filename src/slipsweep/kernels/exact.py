@@ -228,21 +228,6 @@ def next_stage(block: Block, x: float, top: float, held: float, follows: bool) -
     return RiseStage(end, False, crosses)
 
 
-@scalar
-def yield_governs(block: Block, wave: Wave) -> bool:
-    """Whether Eq. 4 stays at or below the yield value over all that the base rises through or jumps to.
-
-    Not said of Newmark's block, which knows no Eq. 4.
-    """
-    governs = block.rise != physics.NEWMARK
-    for i in range(wave.rises.shape[0]):
-        high = block.amplitude * wave.rises[i, 1]
-        if governs and high > block.yield_acceleration:
-            low = max(block.amplitude * wave.rises[i, 0], block.yield_acceleration)
-            governs = physics.stays_below_yield(block, low, high)
-    return governs
-
-
 # ------------------------------------------------------------------ along a part of one piece
 
 

@@ -29,7 +29,7 @@ def uncounted_wave(wave: Wave) -> Wave:
     """The same wave (`decorators.uncounted`)."""
     return Wave(
         uncounted(wave.pieces), uncounted(wave.cycle), uncounted(wave.shape), uncounted(wave.interval),
-        uncounted(wave.height), uncounted(wave.rises), wave.highest, wave.lowest, wave.lead, wave.repeats,
+        uncounted(wave.height), wave.highest, wave.lowest, wave.lead, wave.repeats,
     )  # fmt: skip
 
 

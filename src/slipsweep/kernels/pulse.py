@@ -10,18 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from slipsweep.jit.decorators import scalar
-from slipsweep.kernels.block import (
-    NEWMARK,
-    NO_VALUE,
-    UNSOLVED,
-    Block,
-    Motion,
-    response,
-    settled,
-    without_estimates,
-)
+from slipsweep.kernels import block as physics
+from slipsweep.kernels.block import Block, Motion
 from slipsweep.kernels.excitation import offset_at
-from slipsweep.motion.pieces import Wave
+from slipsweep.motion.pieces import Piece, Wave
 
 #: Intervals of a rise at whose ends `yield_seems_to_govern` looks at Eq. 4.
 _INTERVALS = 32
@@ -69,14 +61,36 @@ def rises_anew(pieces: np.ndarray, p: int) -> bool:
 
 
 @scalar
+def _rise_above_yield(block: Block, piece: Piece) -> tuple[float, float]:
+    """From where to where Üg rises on a piece above Üy, or jumps to; the second is the smaller where it does not."""
+    high = block.amplitude * piece.top
+    rises = high > block.yield_acceleration and (piece.last >= piece.first or piece.jumps)
+    return max(block.amplitude * piece.first, block.yield_acceleration), high if rises else 0.0
+
+
+@scalar
+def yield_governs(block: Block, wave: Wave) -> bool:
+    """Whether Eq. 4 stays at or below the yield value over all that the base rises through or jumps to.
+
+    Not said of Newmark's block, which knows no Eq. 4.
+    """
+    governs = block.rise != physics.NEWMARK
+    for p in range(wave.pieces.shape[0]):
+        low, high = _rise_above_yield(block, wave.pieces[p])
+        if governs and low <= high:
+            governs = physics.stays_below_yield(block, low, high)
+    return governs
+
+
+@scalar
 def yield_seems_to_govern(block: Block, wave: Wave) -> bool:
     """Whether Eq. 4, by any law, stays at or below Üy on all rises; not said of Newmark's block, which has none."""
-    largest = -math.inf if block.rise != NEWMARK else math.inf
-    for i in range(wave.rises.shape[0]):
-        low, high = block.amplitude * wave.rises[i, 0], block.amplitude * wave.rises[i, 1]
-        low, before, now = max(low, block.yield_acceleration), math.inf, -math.inf
-        for j in range(_INTERVALS + 1 if high > block.yield_acceleration else 0):
-            eq4 = response(block, low + (high - low) * (j / _INTERVALS))
+    largest = -math.inf if block.rise != physics.NEWMARK else math.inf
+    for p in range(wave.pieces.shape[0]):
+        low, high = _rise_above_yield(block, wave.pieces[p])
+        before, now = math.inf, -math.inf
+        for j in range(_INTERVALS + 1 if low <= high else 0):
+            eq4 = physics.response(block, low + (high - low) * (j / _INTERVALS))
             if before < now > eq4:  # the vertex of the parabola through three
                 largest = max(largest, now + (eq4 - before) * (eq4 - before) / (8.0 * (2.0 * now - before - eq4)))
             largest, before, now = max(largest, eq4), now, eq4
@@ -87,8 +101,8 @@ def yield_seems_to_govern(block: Block, wave: Wave) -> bool:
 def motion_of(block: Block, sliding_mode: int, validity: int, found: Pulse) -> Motion:
     """The motion of a cell under a waveform; an iteration that has not ended has made its W or V NaN."""
     validity |= found.validity
-    if math.isnan(found.displacement) and validity & NO_VALUE == 0:
-        validity |= UNSOLVED
-    validity = settled(without_estimates(validity), found.displacement, block.amplitude)
-    mode = -1 if validity & NO_VALUE else sliding_mode
+    if math.isnan(found.displacement) and validity & physics.NO_VALUE == 0:
+        validity |= physics.UNSOLVED
+    validity = physics.settled(physics.without_estimates(validity), found.displacement, block.amplitude)
+    mode = -1 if validity & physics.NO_VALUE else sliding_mode
     return Motion(found.displacement, found.peak, float(mode), float(validity), math.nan, math.nan, math.nan)

@@ -5,8 +5,9 @@ import numpy as np
 from slipsweep.jit.compiling import kernel
 from slipsweep.kernels.block import Options, store
 from slipsweep.kernels.continuous import slide_continuously
-from slipsweep.kernels.exact import Workspace, pulse, uncounted_workspace, yield_governs
+from slipsweep.kernels.exact import Workspace, pulse, uncounted_workspace
 from slipsweep.kernels.grid import cell_at, uncounted_wave
+from slipsweep.kernels.pulse import yield_governs
 from slipsweep.kernels.train import cell_solver_of
 from slipsweep.model.friction import exponential
 from slipsweep.motion.pieces import Wave

@@ -1,9 +1,8 @@
 """The equations of Mendez, Romo and Botero (2012), one small function each.
 
 Scalars in, a scalar out, SI units, angles already as tangents; the equation number of the paper stands in each
-docstring.  The kernels call these functions as they are, so that what is written here is what is computed; but for
-`attenuation_coefficient`: in Eq. 12 only g Kd = Ümax counts.  The operators of the printed equations were recovered
-from the paper's Table 1 (docs/tutorial.md, "Against the paper").
+docstring.  The kernels call these functions as they are, so that what is written here is what is computed.  The
+operators of the printed equations were recovered from the paper's Table 1 (docs/tutorial.md, "Against the paper").
 """
 
 import math
@@ -139,14 +138,8 @@ def decay_rate(amplitude: float, mu_s: float, delta_mu: float, minimum_friction:
 
 
 @inlined
-def attenuation_coefficient(peak_block_acceleration: float, g: float) -> float:
-    """Eq. 12: Kd = Ümax / g."""
-    return peak_block_acceleration / g
-
-
-@inlined
 def attenuated_velocity(velocity: float, peak_block_acceleration: float, duration: float) -> float:
-    """Eq. 12: relative velocity after `duration`, g Kd = Ümax, not below zero; as the rate is constant, in one step."""
+    """Eq. 12: relative velocity after `duration`, with g Kd = Ümax, not below zero; the rate is constant: one step."""
     return max(velocity - peak_block_acceleration * duration, 0.0)
 
 

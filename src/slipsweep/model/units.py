@@ -1,6 +1,7 @@
 """Units of what users give: a factor to the parameter's own unit, and numbers with a unit in one text."""
 
 import json
+import math
 import re
 from typing import Any
 
@@ -74,7 +75,7 @@ def quantity(key: str, text: str, own: str, g: float) -> float:
     """
     found = re.fullmatch(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*", text)
     refusal = InputError(f"{key} = {show(text)}: must be a number, with a unit that converts to {own} if in another")
-    if found is None:
+    if found is None or math.isinf(float(found[1])):
         raise refusal
     try:
         return float(found[1]) * conversion(key, own, found[2] or None, g)

@@ -131,12 +131,9 @@ def _pieces(waveform: Waveform, n: int) -> tuple[Exact, ...]:
 
 def _ramped(plain: Derivative, low: float, scale: Any, rate: Any) -> Derivative:
     """A wave times its ramp, a straight line: `scale` at `low`, and of slope `rate` by phase."""
-
-    def derivative(u: Exact, order: int) -> Exact:
-        ramp = scale + rate * (np.asarray(u, _Extended) - low) * _TURN
-        return np.asarray(ramp * plain(u, order) + order * rate * plain(u, order - 1))
-
-    return derivative
+    return lambda u, order: (
+        (scale + rate * (u - _Extended(low)) * _TURN) * plain(u, order) + order * rate * plain(u, order - 1)
+    )
 
 
 def _monotone_pieces(derivative: Derivative, fastest: int, low: float, high: float) -> tuple[Exact, ...]:
@@ -191,17 +188,7 @@ def wave_of(waveform: Waveform) -> Wave:
         arc=np.repeat([is_sine and not own for own in ramped], counts),
     )
     shape = [1 + n if own else 0 for n, own in enumerate(ramped)]
-    return wave_of_pieces(table, np.cumsum([0, *counts]), shape, lead, repeats)._replace(rises=_rises(table))
-
-
-def _rises(pieces: np.ndarray) -> NDArray[np.float64]:
-    """`Wave.rises`: ranges are joined where they overlap."""
-    first, last = pieces["first"], pieces["last"]
-    rising = (first + last > 0.0) & ((last >= first) | pieces["jumps"])
-    order = np.argsort(first[rising])
-    low, high = first[rising][order], np.maximum.accumulate(np.maximum(first, last)[rising][order])
-    apart = low[1:] > high[:-1]
-    return np.column_stack([low[np.append(True, apart)], high[np.append(apart, True)]])
+    return wave_of_pieces(table, np.cumsum([0, *counts]), shape, lead, repeats)
 
 
 #: Tables of pieces that are kept, and bytes of a sample in one, about: a line through zero is two pieces.
@@ -229,4 +216,4 @@ def wave_of_record(record: Record, polarity: float) -> Wave:
         last=last,
         coefficients=np.where(first == last, 0.0, (change / spacing)[own])[:, np.newaxis],
     )
-    return wave_of_pieces(pieces, cycle=[0, own.size], shape=[0])  # each pulse of a record has its own rises
+    return wave_of_pieces(pieces, cycle=[0, own.size], shape=[0])

@@ -4,8 +4,9 @@ docs/records.md#files describes the formats.
 """
 
 import hashlib
+import itertools
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TypeAlias
 
@@ -48,16 +49,12 @@ def read_samples(path: Path, lines: list[str], reading: Reading) -> tuple[str, F
             raise InputError(f"interval = {reading.interval:g}: only for a file without times; this one is {kind}")
         times, values, own = read(lines, reading)
         if own and reading.units and UNITS[own] != UNITS[reading.units]:
-            given = f"units = {reading.units!r}"
-            raise InputError(f"{given}: the file itself says {own!r}; correct its header, or leave units out")
-        unit = own or reading.units
-        if not unit:
-            known = ", ".join(map(repr, UNITS))
-            raise InputError(f"units: must be given, one of {known}: the file does not name the unit")
+            raise InputError(f"units = {reading.units!r}: the file itself says {own!r}; correct it, or leave units out")
+        if not (unit := own or reading.units):
+            raise InputError(f"units: must be given, one of {', '.join(UNITS)}: the file does not name the unit")
         return kind, times, values, unit
     except InputError as error:
-        error.args = (f"{path}: {error}",)
-        raise
+        raise InputError(f"{path}: {error}") from None
 
 
 def _format_of(lines: list[str], reading: Reading) -> str:
@@ -92,8 +89,7 @@ def _csv(lines: list[str], reading: Reading) -> Samples:
 
 def _values(lines: list[str], reading: Reading) -> Samples:
     header, body = _header(lines)
-    found = re.search(_INTERVAL, header)
-    own = float(found[1]) if found else None
+    own = next(map(float, re.findall(_INTERVAL, header)), None)
     step = reading.interval or own
     if step is None:
         raise InputError("interval: must be given, s: the file has accelerations alone, without times")
@@ -139,15 +135,13 @@ def _at2(lines: list[str], reading: Reading) -> Samples:
     # in files of the first database "4096  0.0100  NPTS, DT"
     line = re.sub(rf"(?i)^\s*{_COUNT}\s+{_NUMBER}\s+NPTS,\s*DT", r"NPTS=\1, DT=\2", "".join(lines[at : at + 1]))
     points, interval = _fields(line, {"NPTS=": rf"NPTS\s*=\s*{_COUNT}", "DT=": rf"DT\s*=\s*{_NUMBER}"})
-    values = _numbers(enumerate(lines[at + 1 :], at + 2))
-    return _even(values, float(interval), "g", int(points))
+    return _even(_numbers(enumerate(lines[at + 1 :], at + 2)), float(interval), "g", int(points))
 
 
 def _esm(lines: list[str], reading: Reading) -> Samples:
     at = next((at for at, line in enumerate(lines) if ":" not in line), len(lines))
     known = {"SAMPLING_INTERVAL_S": _NUMBER, "NDATA": _COUNT, "UNITS": r"(\S+)"}
-    patterns = {name: rf"^{name}:\s*{pattern}\s*$" for name, pattern in known.items()}
-    interval, points, unit = _fields("\n".join(lines[:at]), patterns)
+    interval, points, unit = _fields("\n".join(lines[:at]), {name: rf"^{name}:\s*{known[name]}\s*$" for name in known})
     unit = check_choice("UNITS", unit.lower().replace("^", ""), UNITS)
     return _even(_numbers(enumerate(lines[at:], at + 1)), float(interval), unit, int(points))
 
@@ -175,13 +169,11 @@ _COSMOS_DATA = rf"^\s*{_COUNT}\s+\w+.*?\bpts?\b{_COSMOS_FORMAT}"
 
 def _cosmos(lines: list[str], reading: Reading) -> Samples:
     starts = [at for at, line in enumerate(lines) if re.search(_COSMOS_HEAD, line, re.IGNORECASE)]
-    read = (_cosmos_channel(lines[:end], at) for at, end in zip(starts, [*starts[1:], None], strict=False))
+    read = (_cosmos_channel(lines[:end], at) for at, end in itertools.pairwise([*starts, len(lines)]))
     channels = [one for one in read if one is not None]
-    if reading.channel is None and len(channels) > 1:
-        raise InputError(f"holds {len(channels)} channels of acceleration: give channel, from 1 on")
     number = reading.channel or 1
-    if number > len(channels):
-        raise InputError(f"channel = {number}: it holds {len(channels)} channels of acceleration")
+    if number > len(channels) or (reading.channel is None and len(channels) > 1):
+        raise InputError(f"channel = {reading.channel}: must be one of its {len(channels)} channels of acceleration")
     return channels[number - 1]
 
 
@@ -219,8 +211,7 @@ def _cosmos_channel(lines: list[str], at: int) -> Samples | None:
     if whole[1] != 1:
         return None
     if whole[2] not in _COSMOS_UNITS:
-        known = ", ".join(f"{code} ({unit})" for code, unit in _COSMOS_UNITS.items())
-        raise InputError(f"code {whole[2]:.0f} for the unit of its values: must be one of {known}")
+        raise InputError(f"code {whole[2]:.0f} for the unit of its values: must be one of {[*_COSMOS_UNITS]}")
     return _even(values, reals[61] / 1000.0, _COSMOS_UNITS[int(whole[2])])
 
 
@@ -236,15 +227,18 @@ def _fields(header: str, patterns: Mapping[str, str], where: str = "its header")
 
 
 def _numbers(
-    lines: Iterable[tuple[int, str]], cells: Callable[[str], Iterable[str]] = str.split, what: str = "numbers"
+    rows: Iterable[tuple[int, str]],
+    cells: Callable[[str], Iterable[str]] = str.split,
+    what: str = "numbers",
+    where: str = "",
 ) -> Floats:
     """All numbers in the cells of numbered lines, in their order."""
     values: list[float] = []
-    for number, line in lines:
+    for number, line in rows:
         try:
             values.extend(map(float, cells(line)))
         except ValueError:
-            raise InputError(f"line {number}: {shown(line)}: must be {what}") from None
+            raise InputError(f"{where}line {number}: {shown(line)}: must be {what}") from None
     return np.array(values)
 
 
@@ -258,43 +252,36 @@ def _even(values: Floats, interval: float, unit: str | None, points: int | None 
 
 
 def read_columns(
-    path: Path,
-    lines: Sequence[str],
-    holds: Callable[[str, set[str], str], tuple[str, float] | None],
-    needed: Sequence[str],
-    example: str,
+    path: Path, lines: list[str], holds: Callable[[str, set[str], str], tuple[str, float] | None], names: dict[str, str]
 ) -> dict[str, Floats]:
     """Columns of numbers, by what they hold and in its unit; a blank cell is NaN (InputError: the line, and why).
 
     The first line that is not blank and does not begin with ``#`` names the columns.  Separators are tabs, semicolons
     or commas: the first of these that is in it.  Commas that do not separate are decimal.
     ``holds(name, words, unit)`` gives what a column holds, from the words of its name and the unit in brackets behind
-    them, and the factor to its unit; None leaves it out.  `needed` must be there, as in `example`, a line of names.
+    them, and the factor to its unit; None leaves it out.  What has one of `names` must be there, under such a name.
     """
     rows = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
     number, header = rows[0] if rows else (1, "")
     separator = next((one for one in "\t;," if one in header), ",")
-    names = [cell.strip(' "') for cell in header.split(separator)]
-    columns: dict[str, tuple[int, float]] = {}
-    for at, name in enumerate(names):
+    cells = [cell.strip(' "') for cell in header.split(separator)]
+    columns: list[tuple[str, int, float]] = []
+    for at, name in enumerate(cells):
         text, _, unit = name.replace("[", "(").partition("(")
-        what, factor = holds(name, {*re.split(r"[\s_\-]+", text.strip().lower())}, unit.strip(" )]")) or ("", 0.0)
-        if what in columns:
-            raise InputError(f"{path}: line {number}: two columns are {what}: must be one")
-        if what:
-            columns[what] = at, factor
-    for what in needed:
-        if what not in columns:
-            raise InputError(f"{path}: line {number}: no column {what}: must name its columns, such as {example}")
+        if held := holds(name, {*re.split(r"[\s_\-]+", text.strip().lower())}, unit.strip(" )]")):
+            columns.append((held[0], at, held[1]))
+    found = [what for what, *_ in columns]
+    for what in (*names, *found):
+        if (count := found.count(what)) != 1:
+            example = ", ".join(names.values())
+            raise InputError(f"{path}: line {number}: {count} columns of {what}: must be one, as in {example}")
 
-    values = {what: np.empty(len(rows) - 1) for what in columns}
-    for row, (number, line) in enumerate(rows[1:]):
-        cells = [cell.strip().replace(",", ".") for cell in line.split(separator)]
-        if len(cells) != len(names):
-            raise InputError(f"{path}: line {number}: {len(cells)} cells, where {len(names)} columns are named")
-        for what, (at, factor) in columns.items():
-            try:
-                values[what][row] = factor * float(cells[at] or "nan")
-            except ValueError:
-                raise InputError(f"{path}: line {number}: {what} = {shown(cells[at])}: must be a number") from None
-    return values
+    def chosen(line: str) -> list[str]:
+        texts = [text.replace(",", ".").strip() or "nan" for text in line.split(separator)]
+        if len(texts) != len(cells):
+            raise ValueError
+        return [texts[at] for _, at, _ in columns]
+
+    rule = f"{len(cells)} cells, and a number, or nothing, for {', '.join(found)}"
+    table = _numbers(rows[1:], chosen, rule, f"{path}: ").reshape(-1, len(columns))
+    return {what: factor * values for (what, _, factor), values in zip(columns, table.T, strict=True)}

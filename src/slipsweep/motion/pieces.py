@@ -29,7 +29,6 @@ class Wave(NamedTuple):
     shape: np.ndarray  # (cycles,) cycles of one number have the same pieces
     interval: np.ndarray  # (intervals, 2) its first piece, and the first after it
     height: np.ndarray  # (intervals,) its largest w
-    rises: np.ndarray  # (ranges, 2) ranges of w > 0 passed through, or jumped to, without falling; they do not overlap
     highest: float  # w
     lowest: float
     lead: int
@@ -67,7 +66,7 @@ def pieces_of(
 
 
 def wave_of_pieces(pieces: np.ndarray, cycle: ArrayLike, shape: ArrayLike, lead: int = 0, repeats: int = 0) -> Wave:
-    """The wave of a table of pieces; an interval that touches zero ends.  `rises`, of no use to a record, is empty."""
+    """The wave of a table of pieces; an interval that touches zero ends."""
     first, last = pieces["first"], pieces["last"]
     above, top = first + last > 0.0, np.maximum(first, last)
     parted = ~(above[:-1] & above[1:]) | ((last[:-1] == 0.0) & (first[1:] == 0.0))  # from the next piece
@@ -80,7 +79,6 @@ def wave_of_pieces(pieces: np.ndarray, cycle: ArrayLike, shape: ArrayLike, lead:
         shape=np.asarray(shape, np.int64),
         interval=interval,
         height=np.maximum.reduceat(np.append(top, 0.0), interval.ravel())[::2].copy(),
-        rises=np.empty((0, 2)),
         highest=float(top.max()),
         lowest=float(np.minimum(first, last).min()),
         lead=lead,
@@ -122,8 +120,3 @@ def steps_of(wave: Wave, rule: int, steps_per_cycle: int) -> Steps:
     w[at], w[at + 2 * counts] = pieces["first"], pieces["last"]
     w = np.copysign(np.maximum(np.copysign(1.0, pieces["top"][p]) * w, 0.0), pieces["top"][p])
     return Steps(rule, steps_per_cycle, counts, at, w, np.empty(2 * int(counts.max()) + 1))
-
-
-def own_steps(steps: Steps) -> Steps:
-    """The same steps with a workspace of their own, for another thread."""
-    return steps._replace(rates=np.empty_like(steps.rates))

@@ -120,12 +120,11 @@ class Record:
         Examples
         --------
         >>> import types
-        >>> import numpy as np
         >>> import slipsweep
-        >>> stats = types.SimpleNamespace(delta=0.01)
-        >>> trace = types.SimpleNamespace(id="XX.A..HNE", data=np.sin(np.arange(9.0)), stats=stats)
-        >>> slipsweep.Record.from_obspy(trace, "m/s2").summary()
-        'XX.A..HNE: 0.08 s at 0.01 s, PGA 0.1009 g, PGV 0.01832 m/s, read in m/s2'
+        >>> stats = types.SimpleNamespace(delta=0.1)
+        >>> trace = types.SimpleNamespace(id="XX.A..HNE", data=[0.0, 2.0, 0.0], stats=stats)
+        >>> slipsweep.Record.from_obspy(trace, "m/s2")
+        Record('XX.A..HNE': 3 samples, 0.2 s, peak 2 m/s2)
         """
         try:
             data, interval, own = trace.data, check_single("interval", trace.stats.delta), name or str(trace.id)
@@ -133,10 +132,8 @@ class Record:
             raise InputError(f"trace = {shown(trace)}: must be a Trace of ObsPy, one of those in a Stream") from None
         check_choice("units", units, tuple(UNITS))
         if np.asarray(data).dtype.kind in "iu":
-            raise InputError(
-                f"{own}: its data are whole numbers, counts of a digitizer: must be accelerations, such as "
-                "what trace.remove_response(output='ACC') leaves"
-            )
+            counts = f"{own}: its data are whole numbers, counts of a digitizer"
+            raise InputError(f"{counts}: must be accelerations, such as trace.remove_response(output='ACC') leaves")
         values = check_numbers("trace.data", np.ma.filled(data, np.nan))
         times = interval * np.arange(values.size, dtype=np.float64)
         reading = Reading(baseline=baseline, gaps=gaps, implausible=implausible)
@@ -160,10 +157,9 @@ class Record:
         """
         notes = {", read in ": "record_units", "; accepted: ": "record_accepted"}
         read = "".join(text + self.attrs[name] for text, name in notes.items() if name in self.attrs)
-        return (
-            f"{self.name}: {np.ptp(self.times):.4g} s at {np.median(np.diff(self.times)):.4g} s, PGA "
-            f"{self.peak / STANDARD_GRAVITY:.4g} g, PGV {peak_velocity(self.times, self.acceleration):.4g} m/s{read}"
-        )
+        sampled = f"{np.ptp(self.times):.4g} s at {np.median(np.diff(self.times)):.4g} s"
+        velocity = peak_velocity(self.times, self.acceleration)
+        return f"{self.name}: {sampled}, PGA {self.peak / STANDARD_GRAVITY:.4g} g, PGV {velocity:.4g} m/s{read}"
 
 
 def check_samples(name: str, times: Floats, columns: Mapping[str, Floats], least: int) -> None:
@@ -210,7 +206,8 @@ def read_record(
     implausible : {"refuse", "accept"}
         A peak above 3 g or below 0.001 g, which is often that of a wrong unit, and ground that drifts by metres.
     format : {"auto", "csv", "values", "at2", "esm", "cosmos", "knet"}
-        "auto" looks into the file; "values" are accelerations alone; "cosmos" is the format of [1]_.
+        "auto" looks into the file; "values" are accelerations alone; "cosmos" is the Strong Motion Data Format 1.20 of
+        the Consortium of Organizations for Strong-Motion Observation Systems (2001).
     channel : int, optional
         Which channel of acceleration in a COSMOS file, from 1; needed where it holds several.
 
@@ -226,13 +223,7 @@ def read_record(
     See Also
     --------
     read_suite : several files
-    Record : a record from arrays
-    Record.from_obspy : a record from ObsPy
-
-    References
-    ----------
-    .. [1] Consortium of Organizations for Strong-Motion Observation Systems (2001), "COSMOS Strong Motion Data Format",
-       version 1.20.
+    Record, Record.from_obspy : a record from arrays, or from ObsPy
 
     Examples
     --------
@@ -273,14 +264,12 @@ def missing_samples(times: Floats, values: Floats) -> Iterator[str]:
     intervals = np.diff(times)
     if intervals.size < _FEWEST or not (intervals > 0.0).all():
         return
-    median = float(np.median(intervals))
+    median = np.median(intervals)
     wide = np.flatnonzero(intervals > _GAP * median)
     for at in wide[:1]:
+        ratio = f"{intervals[at] / median:.0f} times the median interval of {median:.4g} s"
         more = f", and {wide.size - 1} more" if wide.size > 1 else ""
-        yield (
-            f"no samples from t = {times[at]:.6g} to {times[at + 1]:.6g} s ({intervals[at] / median:.0f} times the "
-            f"median interval of {median:.4g} s){more}"
-        )
+        yield f"no samples from t = {times[at]:.6g} to {times[at + 1]:.6g} s ({ratio}){more}"
 
 
 def _is_fill(values: Floats) -> NDArray[np.bool_]:
@@ -303,11 +292,10 @@ def _held(times: Floats, values: Floats) -> Iterator[str]:
     """The first value that does not change while the ground shakes."""
     if times.size <= _FEWEST or not (np.diff(times) > 0.0).all():
         return
-    starts = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
-    lasts = np.flatnonzero(np.diff(values, append=np.nan) != 0.0)
+    steps = np.abs(np.diff(values, prepend=np.nan, append=np.nan))
+    changes = np.flatnonzero(steps != 0.0)
+    starts, lasts, jumps = changes[:-1], changes[1:] - 1, np.minimum(steps[changes[:-1]], steps[changes[1:]])
     own, peak = values[starts], np.abs(values).max(initial=0.0)
-    before, after = values[np.maximum(starts - 1, 0)], values[np.minimum(lasts + 1, values.size - 1)]
-    jumps = np.minimum(np.abs(before - own), np.abs(after - own))
     shakes = (np.abs(own) > 0.01 * peak) | (jumps > 0.05 * peak)  # else the ground is at rest
     long = (lasts - starts >= _HELD_SAMPLES) & (times[lasts] - times[starts] >= _HELD)
     for at in np.flatnonzero(shakes & long)[:1]:
@@ -331,7 +319,6 @@ def _implausible(record: Record, unit: str) -> Iterator[str]:
     displacement, end = peak_displacement(times, acceleration), float(np.trapezoid(acceleration, times))
     moves_on = displacement > _DRIFT and abs(end) > _DRIFT_VELOCITY * peak_velocity(times, acceleration)
     if moves_on or displacement > _LARGEST_DISPLACEMENT:  # as the integral of an offset does
-        yield (
-            f"the ground moves {displacement:.3g} m and has a velocity of {end:.3g} m/s at t = {times[-1]:.6g} s: "
-            "an offset or a drift; baseline = 'linear' takes a straight line off the acceleration"
-        )
+        drift = "an offset or a drift; baseline = 'linear' takes a straight line off the acceleration"
+        at_end = f"a velocity of {end:.3g} m/s at t = {times[-1]:.6g} s"
+        yield f"the ground moves {displacement:.3g} m and has {at_end}: {drift}"

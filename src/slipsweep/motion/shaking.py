@@ -54,8 +54,7 @@ class ShakingTest:
         if TABLE not in self.channels:
             raise InputError(f"{self.name}: {TABLE}: missing: the acceleration of the table must be measured")
         times = check_numbers(f"{self.name}: time", self.times)
-        own = [name for name in CHANNELS if name in self.channels]
-        kept = {name: check_numbers(f"{self.name}: {name}", self.channels[name]) for name in own}
+        kept = {name: check_numbers(f"{self.name}: {name}", self.channels[name]) for name in (TABLE, *self.responses)}
         filled = {name: np.where(np.isnan(values) & (name != TABLE), 0.0, values) for name, values in kept.items()}
         check_samples(self.name, times, filled, least=16)  # fewer tell nothing of three parameters and their noise
         for name, values in kept.items():
@@ -89,8 +88,7 @@ class ShakingTest:
         for name in (one for one in CHANNELS if one in (*offset, *drift)):
             use = chosen & np.isfinite(channels[name])
             if use.sum() < 3:
-                within = "" if rest is None else f"rest = {shown(rest)}: {use.sum()} samples lie between: "
-                raise InputError(f"{within}{name}: {use.sum()} samples to fit its offset to: must be at least 3")
+                raise InputError(f"rest = {shown(rest)}: {name}: {use.sum()} samples to fit to: must be at least 3")
             line = np.polynomial.Polynomial.fit(since[use], channels[name][use], 1 if name in drift else 0)
             channels[name] = channels[name] - line(since)
             constant, slope = (float(one(0.0)) for one in (line, line.deriv()))
@@ -125,8 +123,7 @@ def read_test(path: str | Path) -> ShakingTest:
         return (channel, unit_factor(f"{path}: column {column}: unit", channel, unit)) if channel else None
 
     digest, lines = read_lines(path)
-    example = "time (s), table acceleration (m/s2), block acceleration (m/s2)"
-    values = read_columns(path, lines, channel_of, ("time", TABLE), example)
+    values = read_columns(path, lines, channel_of, {"time": "time (s)", TABLE: "table acceleration (m/s2)"})
     if missing := "; ".join(missing_samples(values["time"], values[TABLE])):
         raise InputError(f"{path}: {TABLE}: {missing}: samples are missing; take the part of the test that has all")
     attrs = {"test": path.name.encode(errors="backslashreplace").decode(), "test_sha256": digest}
@@ -136,6 +133,4 @@ def read_test(path: str | Path) -> ShakingTest:
 def unit_factor(key: str, channel: str, unit: str) -> float:
     """What to multiply a channel in `unit` by, to have it in SI units."""
     own = "s" if channel == "time" else HISTORY[channel]["units"]
-    if own == "m s-2" and unit.lower() in UNITS:  # "gal", which other libraries take for gallons
-        return UNITS[unit.lower()]
-    return conversion(key, own, unit, STANDARD_GRAVITY)
+    return conversion(key, own, unit.lower() if unit.lower() in UNITS else unit, STANDARD_GRAVITY)

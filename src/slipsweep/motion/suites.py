@@ -139,11 +139,9 @@ class Suite:
             raise InputError(f"motions: {len(motions)}: must be one at least, all Records or all Pairs")
         labels = tuple(check_list("labels", self.labels, "texts"))
         labels = labels or tuple(_labels([Path(_components(one)[0].name) for one in motions]))
-        for label in labels:
-            if not isinstance(label, str) or not label.strip() or not label.isprintable():
-                raise InputError(f"labels: {shown(label)}: must be a text that can be printed")
-        if len(labels) != len(motions) or len({*labels}) < len(labels):
-            raise InputError(f"labels = {shown(labels)}: must be one for each of {len(motions)}, and all different")
+        texts = {one for one in labels if isinstance(one, str) and one.strip() and one.isprintable()}
+        if not len(motions) == len(labels) == len(texts):
+            raise InputError(f"labels = {shown(labels)}: must be {len(motions)} different texts that can be printed")
         object.__setattr__(self, "motions", motions)
         object.__setattr__(self, "labels", labels)
 
@@ -279,8 +277,7 @@ def read_suite(
     >>> slipsweep.read_suite("sweeps/data/suite", pairs=("_H1", "_H2"))
     Suite('sweeps/data/suite': 4 pairs: rock-far, rock-near, soft-far, stiff-pulse)
     """
-    reading = Reading(units, interval, baseline, gaps, implausible, format, channel)
-    return suite_in(Path(), paths, pairs, reading)
+    return suite_in(Path(), paths, pairs, Reading(units, interval, baseline, gaps, implausible, format, channel))
 
 
 def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Reading) -> Suite:

@@ -79,11 +79,9 @@ class Sine(Waveform):
 class Cosine(Waveform):
     """cos φ: it starts at its peak, to which the base's acceleration jumps at t = 0.
 
-    Its parameters are those of `Sine`.
-
     See Also
     --------
-    Sine : starts at zero
+    Sine : the same parameters; starts at zero
 
     Examples
     --------
@@ -99,11 +97,9 @@ class Cosine(Waveform):
 class Triangle(Waveform):
     """Straight lines through 0, 1 at π/2, −1 at 3π/2, 0.
 
-    Its parameters are those of `Sine`.
-
     See Also
     --------
-    Sine, Square : rounder, and fuller
+    Sine : the same parameters; rounder
 
     Examples
     --------
@@ -119,11 +115,9 @@ class Triangle(Waveform):
 class Square(Waveform):
     """1 on (0, π), −1 on (π, 2π).
 
-    Its parameters are those of `Sine`.
-
     See Also
     --------
-    Sine, Triangle : waves without jumps
+    Sine : the same parameters; no jumps
 
     Examples
     --------
@@ -197,9 +191,7 @@ class Harmonics(Waveform, _Terms):
 
 
 #: The waveforms that a user may choose.
-WAVEFORMS: Family[Waveform] = Family(
-    "excitation", "waveform", (Sine, Cosine, Triangle, Square, Harmonics), "sine", "waveform"
-)
+WAVEFORMS = Family[Waveform]("excitation", "waveform", (Sine, Cosine, Triangle, Square, Harmonics), "sine", "waveform")
 
 
 def peak_acceleration(displacement_amplitude: Any, frequency: Any) -> Any:

@@ -127,7 +127,7 @@ def read_hazard_curve(path: str | Path, g: float, site: int | None = None) -> Ha
             raise InputError(f"{where}: must give its unit in brackets, such as PGA (g)")
         return "PGA", conversion(f"{where}: unit", "m s-2", unit, g)
 
-    values = read_columns(path, lines, holds, ("PGA", "annual rate"), "PGA (g), annual rate")
+    values = read_columns(path, lines, holds, {"PGA": "PGA (g)", "annual rate": "annual rate"})
     return HazardCurve(values["PGA"], values["annual rate"], str(path), about)
 
 
