@@ -10,9 +10,13 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
 def part(*fastmath: str, **options: Any) -> Callable[[_Function], _Function]:
-    """`numba.njit` with the options that all have: none assumes away NaN and infinity, which are results here."""
-    own: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", *fastmath}}
-    decorate: Callable[[_Function], _Function] = numba.njit(**own, **options)
+    """`numba.njit` with the options that all have: none assumes away NaN and infinity, which are results here.
+
+    `forceinline` is always said: numba would take it from the function that is compiled just then, and with it hand it
+    on to all that this calls.
+    """
+    own = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", *fastmath}, "forceinline": False}
+    decorate: Callable[[_Function], _Function] = numba.njit(**(own | options))
     return decorate
 
 
@@ -20,8 +24,9 @@ def part(*fastmath: str, **options: Any) -> Callable[[_Function], _Function]:
 #: chooses have other last bits in the process that compiles than in those that load the kernel.
 scalar = part("arcp")
 
-#: The same for what stands in loops over cells: LLVM vectorises a loop only if everything
-#: in it is inlined, which it does not do by itself with functions as long as these.
+#: The same for what stands in loops over cells: LLVM vectorises a loop only if everything in it is inlined, which it
+#: does not do by itself with functions as long as these.  And for what takes a state or a wave at each part of a walk:
+#: their fields are arguments one by one, which takes as long as the step.
 inlined = part("arcp", forceinline=True)
 
 #: The same for a function with one caller and many callees, which numba would otherwise optimise once more.
@@ -33,7 +38,7 @@ elementary = part("nsz", forceinline=True)
 #: The same for functions that are passed as values, those of a friction law: numba keeps a kernel on disk only if such
 #: a function is none that was compiled before.
 registered: Callable[[_Function], _Function] = numba.extending.register_jitable(
-    error_model="numpy", fastmath={"contract", "arcp"}
+    error_model="numpy", fastmath={"contract", "arcp"}, forceinline=True
 )
 
 _ffi = cffi.FFI()

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from slipsweep.jit.decorators import scalar
+from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.kernels import exact
 from slipsweep.kernels.block import (
     Block,
@@ -60,7 +60,7 @@ def find_zeros(block: Block, wants_peak: bool, wave: Wave, workspace: Workspace)
     return workspace.zero_counts[0] >= 0 and workspace.zero_counts[1] >= 0
 
 
-@scalar
+@inlined
 def most_gained(block: Block, wave: Wave, q: int, start: float, end: float, workspace: Workspace) -> float:
     """The most that V gains on a part of piece q up to a zero of D (−∞, if it has none)."""
     pieces, amplitude, highest = wave.pieces, block.amplitude, -math.inf

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from slipsweep.jit.decorators import scalar, single, uncounted
+from slipsweep.jit.decorators import inlined, scalar, single, uncounted
 from slipsweep.kernels import block as physics
 from slipsweep.kernels import linear
 from slipsweep.kernels.block import Block, Options
@@ -113,7 +113,7 @@ def uncounted_workspace(workspace: Workspace) -> Workspace:
     )  # fmt: skip
 
 
-@scalar
+@inlined
 def with_held(state: State, held: float) -> State:
     """The state with another b."""
     return State(
@@ -121,13 +121,13 @@ def with_held(state: State, held: float) -> State:
     )
 
 
-@scalar
+@inlined
 def begun(state: State, held: float) -> State:
     """The state of a block at rest that begins to slide (t1)."""
     return State(0.0, state.displacement, held, True, state.peak, state.least, state.slips + 1.0, state.logged)
 
 
-@scalar
+@inlined
 def state_after(
     state: State, part: Part, kind: int, pieces: np.ndarray, p: int, start: float, log: np.ndarray
 ) -> State:  # fmt: skip
@@ -157,7 +157,7 @@ def note(
 # ------------------------------------------------------------------ Eq. 4 on the rise, as a function of Üg alone
 
 
-@scalar
+@inlined
 def inside(x: float, end: float) -> float:
     """Where on the way from x to end the signs of a stage from x on are read, which is not at x itself."""
     way = end - x
@@ -178,7 +178,7 @@ def next_break(block: Block, x: float, end: float) -> float:
     return end
 
 
-@scalar
+@inlined
 def onset(block: Block, x: float, top: float) -> float:
     """t1: Üg on the rise from x ≥ Üy to `top` at which the block at rest starts to slide (`top` if it does not)."""
     if block.rise == physics.NEWMARK or physics.relative_acceleration(block, inside(x, top)) > 0.0:
@@ -196,7 +196,7 @@ def onset(block: Block, x: float, top: float) -> float:
     return top if x >= top else math.nan
 
 
-@scalar
+@inlined
 def next_stage(block: Block, x: float, top: float, held: float, follows: bool) -> RiseStage:
     """The next stage of a slide on the rise from x to `top`; what `rise` does is decided here.
 
@@ -251,7 +251,7 @@ _held_stop = root_of(_held_lost)
 _followed_stop = root_of(_followed_lost)
 
 
-@scalar
+@inlined
 def hold_integrals(
     piece: Piece, amplitude: float, held: float, rate: float, start: float, end: float
 ) -> tuple[float, float]:
@@ -261,7 +261,7 @@ def hold_integrals(
     return held_integrals(piece, amplitude, held, start, end)
 
 
-@scalar
+@inlined
 def hold(piece: Piece, amplitude: float, held: float, velocity: float, start: float, end: float) -> Part:
     """Slide with b held, V' = Üg − b, along a piece from start to end, or to the stop."""
     # most parts are whole pieces, whose ends are known
@@ -302,7 +302,7 @@ def hold(piece: Piece, amplitude: float, held: float, velocity: float, start: fl
     return Part(end, last, velocity * (end - start) + displaced, max(peak, last), min(least, last), stops)
 
 
-@scalar
+@inlined
 def follow(block: Block, piece: Piece, velocity: float, start: float, end: float) -> Part:
     """Slide under Eq. 4 along a piece, on which D keeps its sign, from start to end or to the stop."""
     gained, displaced = eq4_integrals(block, piece, start, end)
@@ -318,7 +318,7 @@ def follow(block: Block, piece: Piece, velocity: float, start: float, end: float
 # ------------------------------------------------------------------ along the pieces of a pulse
 
 
-@scalar
+@inlined
 def place_of(block: Block, pieces: np.ndarray, x: float, p: int, tau: float, last: int) -> tuple[int, float]:
     """Where on the rise from τ on piece p to the end of piece `last` the base's acceleration comes to x."""
     while p < last and block.amplitude * pieces[p].last < x:
@@ -329,7 +329,7 @@ def place_of(block: Block, pieces: np.ndarray, x: float, p: int, tau: float, las
     return p, max(tau, offset_at(pieces[p], block.amplitude, x))
 
 
-@scalar
+@inlined
 def rise(
     block: Block, pieces: np.ndarray, first: int, last: int, tau: float, x: float, state: State, log: np.ndarray
 ) -> State:  # fmt: skip
@@ -376,7 +376,7 @@ def rise(
     return State(math.nan, math.nan, state.held, True, math.nan, math.nan, state.slips, state.logged)
 
 
-@scalar
+@inlined
 def reset_held(block: Block, pieces: np.ndarray, p: int, x: float, state: State) -> State:
     """Reset b of a block that slides where piece p, Üg = x, begins, or begin a slide there (t1), if not by a rise."""
     if state.sliding:
@@ -391,7 +391,7 @@ def reset_held(block: Block, pieces: np.ndarray, p: int, x: float, state: State)
     return state
 
 
-@scalar
+@inlined
 def end_of_rise(pieces: np.ndarray, p: int, end: int) -> int:
     """The last piece of the rise that begins with piece p, before piece `end`."""
     while p + 1 < end and pieces[p].last == pieces[p + 1].first < pieces[p + 1].last:
@@ -399,7 +399,7 @@ def end_of_rise(pieces: np.ndarray, p: int, end: int) -> int:
     return p
 
 
-@scalar
+@inlined
 def hold_on(
     pieces: np.ndarray, p: int, amplitude: float, start: float, end: float, state: State, log: np.ndarray
 ) -> State:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from slipsweep.jit.decorators import scalar
+from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.kernels import block as physics
 from slipsweep.kernels.block import Block, Motion
 from slipsweep.kernels.excitation import offset_at
@@ -33,7 +33,7 @@ class Pulse(NamedTuple):
     validity: int
 
 
-@scalar
+@inlined
 def first_pulse(block: Block, wave: Wave, k: int) -> int:
     """The first interval from k on in which the base's acceleration exceeds Üy; past the last, if there is none."""
     while k < wave.height.size and block.amplitude * wave.height[k] <= block.yield_acceleration:
@@ -41,7 +41,7 @@ def first_pulse(block: Block, wave: Wave, k: int) -> int:
     return k
 
 
-@scalar
+@inlined
 def beginning(block: Block, wave: Wave, k: int) -> tuple[int, float]:
     """Where in interval k the base's acceleration comes to Üy or jumps past it: a piece, and τ on it."""
     p = wave.interval[k, 0]
@@ -52,7 +52,7 @@ def beginning(block: Block, wave: Wave, k: int) -> tuple[int, float]:
     return p, offset_at(wave.pieces[p], block.amplitude, block.yield_acceleration)
 
 
-@scalar
+@inlined
 def rises_anew(pieces: np.ndarray, p: int) -> bool:
     """Whether piece p, of Üg > 0, begins by a jump upwards, is a plateau, or rises after a fall."""
     first, last = pieces[p].first, pieces[p].last
