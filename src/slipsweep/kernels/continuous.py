@@ -8,15 +8,9 @@ import math
 import numpy as np
 
 from slipsweep.jit.decorators import inlined, scalar
+from slipsweep.kernels import block as physics
 from slipsweep.kernels import exact
-from slipsweep.kernels.block import (
-    Block,
-    Options,
-    inflection,
-    opposite,
-    relative_acceleration,
-    relative_acceleration_root,
-)
+from slipsweep.kernels.block import Block, Options
 from slipsweep.kernels.eq4 import eq4_integrals, lag_integrals
 from slipsweep.kernels.exact import MOST_STAGES, Workspace, inside, next_break
 from slipsweep.kernels.excitation import offset_at, phase_at
@@ -31,15 +25,17 @@ def zeros_on_one_side(block: Block, end: float, zeros: np.ndarray) -> int:
     count = 0
     x = math.copysign(0.0, end)
     inner = inside(x, end)
-    if inflection(block) <= 0.0 and opposite(relative_acceleration(block, inner), relative_acceleration(block, end)):
+    if physics.inflection(block) <= 0.0 and physics.opposite(
+        physics.relative_acceleration(block, inner), physics.relative_acceleration(block, end)
+    ):
         # D bends to one side only
-        zeros[0] = relative_acceleration_root(block, inner, end)
+        zeros[0] = physics.relative_acceleration_root(block, inner, end)
         return -1 if math.isnan(zeros[0]) else 1
     for _ in range(MOST_STAGES):
         target = next_break(block, x, end)
         inner = inside(x, target)
-        if opposite(relative_acceleration(block, inner), relative_acceleration(block, target)):
-            zeros[count] = relative_acceleration_root(block, inner, target)
+        if physics.opposite(physics.relative_acceleration(block, inner), physics.relative_acceleration(block, target)):
+            zeros[count] = physics.relative_acceleration_root(block, inner, target)
             if math.isnan(zeros[count]):
                 return -1
             count += 1

@@ -14,7 +14,7 @@ import numpy as np
 from slipsweep.jit.decorators import inlined, scalar, single, uncounted
 from slipsweep.kernels import block as physics
 from slipsweep.kernels import linear
-from slipsweep.kernels.block import Block, Options
+from slipsweep.kernels.block import Block
 from slipsweep.kernels.eq4 import eq4_integrals
 from slipsweep.kernels.events import root_of
 from slipsweep.kernels.excitation import base_acceleration, held_gain, held_integrals, offset_at, phase_at
@@ -442,7 +442,7 @@ def recouple(
 
 @single
 def pulse(
-    block: Block, options: Options, wave: Wave, workspace: Workspace, k: int, following: int, velocity: float
+    block: Block, options: physics.Options, wave: Wave, workspace: Workspace, k: int, following: int, velocity: float
 ) -> Pulse:
     """From Üg = Üy in interval k to that in the `following` one, or to the end of the motion if none follows.
 
