@@ -185,10 +185,14 @@ def why_nothing_slides(data: xr.Dataset, tally: Tally) -> str:
         mu_s = float(coords["mu_s"].min()) if "mu_s" in coords else 0.0
         is_angle = mu_s > 3.0 and "phi" not in coords
         return f"no cell has a value: {why}" + (f"; did you mean phi = {mu_s:.6g}?" if is_angle else "")
-    if "amplitude" not in coords or is_recorded(data):
+    g = float(data.attrs["g"])
+    smallest = {name: float(coords[name].min()) for name in ("yield_acceleration", "mu_s") if name in coords}
+    if "mu_s" in smallest and "theta" in coords:
+        coulomb = g * math.tan(math.atan(smallest["mu_s"]) - math.radians(coords["theta"].max()))
+        smallest.setdefault("yield_acceleration", coulomb)
+    if "amplitude" not in coords or "yield_acceleration" not in smallest:
         return "no cell slides"
-    g, largest = float(data.attrs["g"]), float(coords["amplitude"].max())
-    least = float(thresholds(data)["yield_line"].min())
+    least, largest = smallest["yield_acceleration"], float(coords["amplitude"].max())
     hint = '; did you mean units = "g"?' if largest <= 3.0 and largest * g > least else ""
     texts = (f"{one:.6g} m/s2 ({one / g:.4g} g)" for one in (largest, least))
     return "no cell slides: largest amplitude {}, smallest yield acceleration {}".format(*texts) + hint

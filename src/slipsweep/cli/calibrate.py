@@ -155,7 +155,7 @@ def _echo_parameters(table: "xr.Dataset") -> None:
     columns = ["value", "error", "95 % from", "to"]
     rows = [[table[one], table[f"{one}_error"], *table[f"{one}_interval"]] for one in SOUGHT]
     found = pd.DataFrame(rows, [f"{one} ({table[one].attrs['units']})" for one in SOUGHT], columns, dtype=float)
-    found.loc[found["error"] == math.inf, columns[:2]] = math.nan  # the data do not determine it
+    found.loc[~(found["error"] < math.inf), columns[:2]] = math.nan  # the data do not determine it
     echo(_text(found), "correlation", _text(pd.DataFrame(table["correlation"].values, [*SOUGHT], [*SOUGHT])))
     echo("misfit, root mean square, and in parts of the largest value")
     for name in (one for one in RESPONSES if f"misfit_{one}" in table):
