@@ -28,7 +28,7 @@ LINES = {
     "files": 1_875,
     "charts": 2_470,
     "explore": 665,
-    "cli": 1_260,
+    "cli": 1_258,
 }
 
 #: Modules in all, and lines of a function's body.

@@ -73,9 +73,7 @@ def friction(
     test: Annotated[Path, options.read("TEST.csv", _COLUMNS)],
     measured: Measured,
     g: Annotated[float, options.BLOCK("Gravity, m/s².")] = 9.81,
-    rest: Annotated[
-        tuple[float, float] | None, TEST("Two times, s, between which all is at rest: finds offsets and drifts by it.")
-    ] = None,
+    rest: Annotated[tuple[float, float] | None, TEST("Times of rest, s, to find both by.", "FROM TO")] = None,
     threshold: Annotated[
         Text, TEST("Relative acceleration of a slide: 0.02g (default: 4 times its noise).", "VALUE")
     ] = None,
