@@ -1,4 +1,4 @@
-"""What charts compute on their slice: thresholds, Newmark's block, other options of the model, trends no block has."""
+"""What charts compute on their slice, and what a run warns of: thresholds, other options, trends that no block has."""
 
 import math
 from collections.abc import Iterable

@@ -77,10 +77,11 @@ def hazard(
     echo(*(f"{name} = {values_text(value)}" for name, value in values.items()))
     rate, held, omitted = (rates[name] for name in ("annual_rate", "held_rate", "omitted_rate"))
     axis = "the axis amplitude of the sweep" if high < end else "the hazard curve"
-    missing, samples = rates["valueless_share"], "samples" in rates.attrs["suite_dimensions"]
-    unstable = "; samples that are statically unstable count as exceeding" if samples else ""
+    missing, what = rates["valueless_share"], "samples" if "samples" in rates.attrs["suite_dimensions"] else "motions"
+    unstable = "; those that are statically unstable count as exceeding" if what == "samples" else ""
     notes = {
-        f"up to {missing.max():.1%} have no value at an amplitude: left out of P{unstable}": missing > 0.0,
+        f"up to {missing.max():.1%} of the {what} have no value at an amplitude: left out of P{unstable}": missing
+        > 0.0,
         "without an annual rate: fewer than two amplitudes have a value": rate.isnull(),
         "annual rate 0: the displacement is not exceeded at any amplitude of the result": rate == 0.0,
         f"above {last:.4g} g P(u > d) is taken as it is there: to compute it, extend {axis}": held > _MUCH * rate,

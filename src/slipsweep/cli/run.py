@@ -5,7 +5,7 @@ import time
 import tomllib
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from slipsweep.cli import common, options
 from slipsweep.cli.common import echo, range_text
@@ -14,9 +14,6 @@ from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files import outputs
 from slipsweep.model import variables
 from slipsweep.model.options import SOLVERS
-
-if TYPE_CHECKING:
-    pass
 
 
 @options.command("Start", "slipsweep example", "slipsweep example paper")
