@@ -14,11 +14,10 @@ from slipsweep import Step
 from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import inlined, registered
 from slipsweep.kernels.block import EQ12, INTEGRATE, MONOTONE, Cell, Motion, Options
-from slipsweep.kernels.step import solve_cell
+from slipsweep.kernels.step import RECTANGLE, SIMPSON, TRAPEZOID, Steps, solve_cell
 from slipsweep.model.friction import FrictionLaw
 from slipsweep.model.variables import VALUELESS, Validity
 from slipsweep.motion.cutting import wave_of
-from slipsweep.motion.pieces import RECTANGLE, SIMPSON, TRAPEZOID, Steps, steps_of
 from slipsweep.motion.waveforms import Sine, Square, Triangle, Waveform
 from tests.support.cases import Case, Found, choices, read_cases
 from tests.support.cases import solve as by_sweeps
@@ -256,7 +255,7 @@ class Hyperbolic:
     def found(self, rule: str, steps_per_cycle: int, cycles: int, recoupling: str = "eq12") -> Motion:
         cell = Cell(self.tangent, self.mu_s, self.amplitude, self.least, self.decay_rate, 0.0, np.nan)
         wave = wave_of(Sine(cycles=cycles))
-        steps = steps_of(wave, RULES[rule], steps_per_cycle)
+        steps = Steps(RULES[rule], steps_per_cycle, np.empty((2, 2 * steps_per_cycle + 1)))
         options = Options(MONOTONE, EQ12 if recoupling == "eq12" else INTEGRATE, cycles, wants_peak=True, g=G)
         return solve_hyperbolic(cell, options, wave, steps)
 

@@ -11,16 +11,16 @@ from slipsweep.kernels.exact import workspace_of
 from slipsweep.kernels.grid import find_parameters
 from slipsweep.kernels.record import solve_record
 from slipsweep.kernels.sine.solve import solve_sine
-from slipsweep.kernels.step import solve_steps
+from slipsweep.kernels.step import RECTANGLE, SIMPSON, TRAPEZOID, solve_steps
 from slipsweep.kernels.waves import solve_waves
 from slipsweep.model.options import Mendez, Step
 from slipsweep.model.variables import FRICTION_PARAMETERS
-from slipsweep.motion import cutting, pieces
+from slipsweep.motion import cutting
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import Sine, Waveform
 
-RULES = {"rectangle": pieces.RECTANGLE, "trapezoid": pieces.TRAPEZOID, "simpson": pieces.SIMPSON}
+RULES = {"rectangle": RECTANGLE, "trapezoid": TRAPEZOID, "simpson": SIMPSON}
 RISES = {"monotone": physics.MONOTONE, "literal": physics.LITERAL}
 RECOUPLINGS = {"eq12": physics.EQ12, "integrate": physics.INTEGRATE}
 
@@ -80,10 +80,7 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
     assert isinstance(motion, Waveform)
     if isinstance(problem.solver, Step):
         wave, rule, count = cutting.wave_of(motion), RULES[problem.solver.rule], problem.solver.steps_per_cycle
-        # each call has steps of its own, which hold a workspace
-        return Solver(
-            lambda cells, results: solve_steps(cells, options, wave, pieces.steps_of(wave, rule, count), results), ROWS
-        )
+        return Solver(lambda cells, results: solve_steps(cells, options, wave, rule, count, results), ROWS)
     return Solver(under_sine if is_plain_sine(motion) else under_wave, ROWS)
 
 

@@ -32,14 +32,24 @@ from slipsweep.kernels.series import Gain, series_of
 from slipsweep.kernels.train import cell_solver_of
 from slipsweep.model import equations as eq
 from slipsweep.model.friction import exponential
-from slipsweep.motion.pieces import RECTANGLE, TRAPEZOID, Piece, Steps, Wave
+from slipsweep.motion.pieces import Piece, Wave
 
+#: Rules by which steps are taken.
+RECTANGLE, TRAPEZOID, SIMPSON = 0, 1, 2
 #: How b goes on besides the ways of `block.rise`: held (Üg falls), and by Eq. 4 without a stop (continuous sliding).
 HELD, FOLLOWED = 3, 4
 #: From its onset to the largest D a slide takes N/64 steps at least, N a cycle; no cut makes a step shorter than this.
 SHARE_OF_CYCLE, LEAST_STEP = 64.0, 1e-14
 #: Accelerations nearer to each other than this part of Üg are one.
 ROUNDING = 1e-12
+
+
+class Steps(NamedTuple):
+    """How steps are taken: all on a piece have one length, so that they end where it does."""
+
+    rule: int
+    per_cycle: int  # steps in 2π of phase, at least
+    workspace: np.ndarray  # (2, 2 per_cycle + 1): Üg, and Üg − Ü by Eq. 4, at ends and middles of the steps on a piece
 
 
 class State(NamedTuple):
@@ -137,10 +147,16 @@ def eq4_rate(block: Block, x: float) -> float:
 
 
 @scalar
-def tabulate(block: Block, w: np.ndarray, rates: np.ndarray) -> None:
-    """Write the rates by Eq. 4 at values of w, many at a time (SIMD)."""
-    for j in range(w.size):
-        rates[j] = eq4_rate(block, block.amplitude * w[j])
+def tabulate(block: Block, piece: Piece, first: int, half: float, base: np.ndarray, rates: np.ndarray) -> None:
+    """Write Üg, and the rate by Eq. 4, at τ = `half` times `first`, `first` + 1, … on a piece (SIMD)."""
+    base[:] = 0.0
+    for k in range(piece.degree - 1, -1, -1):
+        coefficient = piece.coefficients[k]
+        for j in range(base.size):
+            base[j] = (base[j] + coefficient) * ((first + j) * half)
+    for j in range(base.size):
+        base[j] = math.copysign(block.amplitude * (piece.top + base[j]), piece.top)
+        rates[j] = eq4_rate(block, base[j])
 
 
 @scalar
@@ -298,30 +314,36 @@ def walk(
     block: Block, pieces: np.ndarray, steps: Steps, p: int, tau: float, until: float, how: int, state: State
 ) -> State:
     """From τ to `until` on piece p, step by step."""
-    w, rates, rule, per_cycle, amplitude = steps.w, steps.rates, steps.rule, steps.per_cycle, block.amplitude
-    at, count, begin = steps.at[p], steps.counts[p], pieces[p].begin
-    h, shift, limit = (pieces[p].finish - begin) / count, pieces[p].start - begin, math.inf
-    i = min(max(int((tau - begin) / h), 0), count - 1)
-    if how != HELD:
-        tabulate(block, w[at + 2 * i : at + 2 * count + 1], rates[2 * i :])
+    piece, per_cycle, limit = pieces[p], steps.per_cycle, math.inf
+    count = max(math.ceil((piece.finish - piece.begin) / (2.0 * math.pi) * per_cycle - 1e-9), 1)
+    h = (piece.finish - piece.begin) / count
+    # steps are counted from the anchor, so that mirrored pieces have mirrored values
+    last = count if piece.begin == 0.0 else 0
+    first = last - count + min(max(int((tau - piece.begin) / h), 0), count - 1)
+    size = 2 * (last - first) + 1
+    base, rates = steps.workspace[0, :size], steps.workspace[1, :size]
+    tabulate(block, piece, 2 * first, 0.5 * h, base, rates)
     if how != HELD and block.rise != physics.NEWMARK:
         # a second difference of (32/N)² of what friction takes off Üg at most, or of rounding
-        most = (block.g + amplitude * block.tan_theta) * physics.friction(block, 0.0)
-        limit = (0.5 * SHARE_OF_CYCLE / per_cycle) ** 2 * most + ROUNDING * amplitude
-    first, start = i if begin == 0.0 else i - count, point_at(block, pieces[p], tau)
-    while i < count and start.tau < until and (state.sliding or how != HELD):
-        end = Point((first + 1) * h, amplitude * w[at + 2 * i + 2], rates[2 * i + 2])
-        middle = Point((first + 0.5) * h, amplitude * w[at + 2 * i + 1], rates[2 * i + 1])
-        if end.tau > until or start.tau > first * h:
-            end = end if end.tau <= until else point_at(block, pieces[p], until)
-            middle = point_at(block, pieces[p], 0.5 * (start.tau + end.tau))
-        longest, after = longest_step(per_cycle, shift + start.tau, state), state
+        most = (block.g + block.amplitude * block.tan_theta) * physics.friction(block, 0.0)
+        limit = (0.5 * SHARE_OF_CYCLE / per_cycle) ** 2 * most + ROUNDING * block.amplitude
+    start = point_at(block, piece, tau)
+    for step in range(first, last):
+        if start.tau >= until or (how == HELD and not state.sliding):
+            break
+        at = 2 * (step - first)
+        middle = Point((step + 0.5) * h, base[at + 1], rates[at + 1])
+        end = Point((step + 1) * h, base[at + 2], rates[at + 2])
+        if end.tau > until or start.tau > step * h:
+            end = end if end.tau <= until else point_at(block, piece, until)
+            middle = point_at(block, piece, 0.5 * (start.tau + end.tau))
+        longest, after = longest_step(per_cycle, excitation.phase_at(piece, start.tau), state), state
         whole = is_whole(how, start, middle, end, longest, limit, state)
         if whole:
-            _, after = slide(block, rule, how, start, middle, end, state)
+            _, after = slide(block, steps.rule, how, start, middle, end, state)
         if not whole or not (after.sliding or how == HELD):  # after a stop on a rise a slide may begin anew
-            after = cut_step(block, pieces[p], rule, per_cycle, how, start, end, limit, state)
-        state, start, i, first = after, end, i + 1, first + 1
+            after = cut_step(block, piece, steps.rule, per_cycle, how, start, end, limit, state)
+        state, start = after, end
     return state
 
 
@@ -383,7 +405,10 @@ solve_cell = cell_solver_of(pulse, series_of(follow), pulses.yield_seems_to_gove
 
 
 @kernel
-def solve_steps(cells: np.ndarray, options: physics.Options, wave: Wave, steps: Steps, results: np.ndarray) -> None:
+def solve_steps(
+    cells: np.ndarray, options: physics.Options, wave: Wave, rule: int, per_cycle: int, results: np.ndarray
+) -> None:
     """Solve the cells of a tile by steps; `results` is (fields of `Motion`, cells)."""
+    steps = Steps(rule, per_cycle, np.empty((2, 2 * per_cycle + 1)))
     for j in range(cells.size):
         physics.store(solve_cell(exponential(), cell_at(cells, j), options, wave, steps), j, results)

@@ -1,9 +1,8 @@
-"""The table of pieces that every motion of the base ends as, and the steps that `kernels.step` takes on them.
+"""The table of pieces that every motion of the base ends as.
 
 `slipsweep.motion.cutting` cuts waveforms and records into pieces, `slipsweep.kernels.excitation` evaluates them.
 """
 
-import math
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -84,39 +83,3 @@ def wave_of_pieces(pieces: np.ndarray, cycle: ArrayLike, shape: ArrayLike, lead:
         lead=lead,
         repeats=repeats,
     )
-
-
-#: Rules by which steps are taken (`kernels.step`).
-RECTANGLE, TRAPEZOID, SIMPSON = 0, 1, 2
-
-
-class Steps(NamedTuple):
-    """The steps of a wave: `counts[p]` of one length on piece p, so that they end where it does.
-
-    ``w[at[p] + 2 * i]`` is w where step i of piece p begins; w at its middle and at its end follow.
-    """
-
-    rule: int
-    per_cycle: int  # steps in 2π of phase, at least
-    counts: np.ndarray
-    at: np.ndarray
-    w: np.ndarray  # −0.0 where a negative piece is 0: Eq. 4 jumps there
-    rates: np.ndarray  # workspace of `kernels.step`: Üg − Ü by Eq. 4 at the values of w on a piece
-
-
-def steps_of(wave: Wave, rule: int, steps_per_cycle: int) -> Steps:
-    """The steps of a wave."""
-    pieces, length = wave.pieces, wave.pieces["finish"] - wave.pieces["begin"]
-    counts = np.maximum(np.ceil(length / (2.0 * math.pi) * steps_per_cycle - 1e-9), 1.0).astype(np.int64)
-    at = np.cumsum(2 * counts + 1) - (2 * counts + 1)
-    p = np.repeat(np.arange(counts.size), 2 * counts + 1)
-    # counted from the anchor of a piece, so that mirrored pieces have mirrored values
-    halves = np.arange(p.size) - at[p] - np.where(pieces["begin"][p] < 0.0, 2 * counts[p], 0)
-    tau = halves * (length / (2 * counts))[p]
-    w = np.zeros(p.size)
-    for k in range(int(pieces["degree"].max()) - 1, -1, -1):
-        w = (w + pieces["coefficients"][p, k]) * tau
-    w += pieces["top"][p]
-    w[at], w[at + 2 * counts] = pieces["first"], pieces["last"]
-    w = np.copysign(np.maximum(np.copysign(1.0, pieces["top"][p]) * w, 0.0), pieces["top"][p])
-    return Steps(rule, steps_per_cycle, counts, at, w, np.empty(2 * int(counts.max()) + 1))
