@@ -20,15 +20,15 @@ ORDER = (
 #: whoever takes something away lowers the limit.
 LINES = {
     "jit": 315,
-    "model": 1_360,
-    "motion": 1_831,
+    "model": 1_358,
+    "motion": 1_785,
     "kernels": 3_150,
-    "grid": 1_050,
+    "grid": 1_047,
     "studies": 3_885,
     "files": 1_875,
     "charts": 2_470,
     "explore": 665,
-    "cli": 1_258,
+    "cli": 1_256,
 }
 
 #: Modules in all, and lines of a function's body.

@@ -68,7 +68,6 @@ def test_stems_that_are_alike_are_told_apart(tmp_path: Path) -> None:
 def test_motions_that_are_the_same_are_told(folder: Path) -> None:
     (folder / "d.csv").write_text((folder / "b.csv").read_text() + "\n")  # another file, the same motion
     suite = read_suite(folder)
-    assert suite.duplicates == (("b", "d"),)
     assert suite.attrs["duplicate_motions"] == "b, d"
     assert "duplicate_motions" not in suite[["a", "b"]].attrs
 

@@ -11,10 +11,8 @@ from slipsweep.jit.decorators import scalar
 @scalar
 def held_integrals(rate: float, slope: float, duration: float) -> tuple[float, float]:
     """Gains of velocity and displacement, ∫ (x − b) dt and its integral: `rate` is x − b at the beginning."""
-    return (
-        (rate + 0.5 * slope * duration) * duration,
-        (0.5 * rate + slope * duration / 6.0) * duration * duration,
-    )
+    gained = (rate + 0.5 * slope * duration) * duration
+    return gained, (0.5 * rate + slope * duration / 6.0) * duration * duration
 
 
 @scalar

@@ -144,15 +144,6 @@ def remarks_in(cell: physics.Cell, block: Block, interface: physics.Interface, c
     return remarks
 
 
-@inlined
-def added(total: float, lost: float, term: float) -> tuple[float, float]:
-    """A sum and what rounding has lost of it, with a term more: a record has up to a million of them."""
-    now = total + term
-    without = now - total
-    rounded = (total - (now - without)) + (term - without)
-    return now, lost + (rounded if math.isfinite(now) else 0.0)
-
-
 @scalar
 def validity_of_record(law: FrictionLaw, cell: physics.Cell, options: Options, wave: Wave) -> int:
     """What is known before the motion: Üy ≤ 0, no limit by Eq. 7, or n ≤ 0 where Üg is lowest."""
@@ -192,11 +183,12 @@ def solve_cell(
             if now.velocity > 0.0 and following < wave.height.size and block.rise != physics.NEWMARK:
                 validity |= physics.NOT_RECOUPLED
         velocity, highest, slips = now.velocity, max(now.peak, highest), slips + now.slips
-        displacement, lost = added(displacement, lost, now.displacement)
+        # Kahan's sum: a record has up to a million pulses
+        term = now.displacement - lost
+        lost, displacement = ((displacement + term) - displacement) - term, displacement + term
         if math.isnan(displacement + highest) and validity & physics.NO_VALUE == 0:
             validity |= physics.UNSOLVED
         k = following
-    displacement += lost
     validity = physics.settled(validity, displacement, scale * max(wave.highest, -wave.lowest))
     if validity & physics.NO_VALUE:
         return physics.Motion(math.nan, math.nan, math.nan, float(validity), -1.0, -1.0, -1.0)

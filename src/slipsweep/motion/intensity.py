@@ -23,8 +23,8 @@ Floats = NDArray[np.float64]
 #: Frequencies that the mean period is of, Hz, and their largest spacing (Rathje et al. 1998, 2004).
 _LOWEST, _HIGHEST, _SPACING = 0.25, 20.0, 0.05
 
-#: Sampling of a motion whose own is not even, s, and the most samples of a transform.
-_RESAMPLED, _MOST_SAMPLES = 0.005, 2**22
+#: Sampling of a motion whose own is not even, s.
+_RESAMPLED = 0.005
 
 
 def intensity_measures(times: Floats, acceleration: Floats) -> dict[str, float]:
@@ -104,7 +104,6 @@ def mean_period(times: Floats, acceleration: Floats) -> float:
     """
     spacing = spacing_of(times)
     step = float(spacing[0]) if np.ptp(spacing) == 0.0 else min(float(np.median(spacing)), _RESAMPLED)
-    step = max(step, max(float(np.ptp(times)), 1.0 / _SPACING) / _MOST_SAMPLES)
     samples = np.interp(np.arange(times[0], times[-1] + 1e-6 * step, step), times, acceleration)
     length = max(samples.size, math.ceil(1.0 / (_SPACING * step)))
     frequency = np.fft.rfftfreq(length, step)

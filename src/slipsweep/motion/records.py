@@ -290,8 +290,6 @@ def _is_fill(values: Floats) -> NDArray[np.bool_]:
 
 def _held(times: Floats, values: Floats) -> Iterator[str]:
     """The first value that does not change while the ground shakes."""
-    if times.size <= _FEWEST or not (np.diff(times) > 0.0).all():
-        return
     steps = np.abs(np.diff(values, prepend=np.nan, append=np.nan))
     changes = np.flatnonzero(steps != 0.0)
     starts, lasts, jumps = changes[:-1], changes[1:] - 1, np.minimum(steps[changes[:-1]], steps[changes[1:]])

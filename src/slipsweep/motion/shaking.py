@@ -88,7 +88,7 @@ class ShakingTest:
         for name in (one for one in CHANNELS if one in (*offset, *drift)):
             use = chosen & np.isfinite(channels[name])
             if use.sum() < 3:
-                raise InputError(f"rest = {shown(rest)}: {name}: {use.sum()} samples to fit to: must be at least 3")
+                raise InputError(f"{name}: {use.sum()} samples to fit to between the times of rest: at least 3")
             line = np.polynomial.Polynomial.fit(since[use], channels[name][use], 1 if name in drift else 0)
             channels[name] = channels[name] - line(since)
             constant, slope = (float(one(0.0)) for one in (line, line.deriv()))

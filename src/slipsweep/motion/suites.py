@@ -179,15 +179,6 @@ class Suite:
         return tuple(chain.from_iterable(map(_components, self)))
 
     @cached_property
-    def duplicates(self) -> tuple[tuple[str, ...], ...]:
-        """Labels of motions that have the same samples, such as one file under two names."""
-        alike = defaultdict[bytes, list[str]](list)
-        for label, motion in zip(self.labels, self, strict=True):
-            samples = b"".join(one.acceleration.tobytes() + one.times.tobytes() for one in _components(motion))
-            alike[samples].append(label)
-        return tuple(tuple(labels) for labels in alike.values() if len(labels) > 1)
-
-    @cached_property
     def measures(self) -> dict[str, NDArray[Any]]:
         """`variables.MOTION_COORDINATES` of every motion; of pairs without the intensity, which the azimuth makes."""
         found: dict[str, NDArray[Any]] = {
@@ -218,8 +209,12 @@ class Suite:
             values = {one.attrs.get(name) for one in self.components}
             if len(values) == 1 and None not in values:
                 about[name] = values.pop()
-        if self.duplicates:
-            about["duplicate_motions"] = "; ".join(", ".join(labels) for labels in self.duplicates)
+        alike = defaultdict[bytes, list[str]](list)  # such as one file under two names
+        for label, motion in zip(self.labels, self, strict=True):
+            samples = (one.times.tobytes() + one.acceleration.tobytes() for one in _components(motion))
+            alike[b"".join(samples)].append(label)
+        if twice := [", ".join(labels) for labels in alike.values() if len(labels) > 1]:
+            about["duplicate_motions"] = "; ".join(twice)
         return about
 
     def summary(self) -> str:
@@ -284,8 +279,7 @@ def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Rea
     """`read_suite` of paths that are relative to a folder, whatever letters its own name has."""
     sources = _sources(paths, folder)
     sources, labels = (sources, ()) if pairs is None else _paired(sources, pairs)
-    records: dict[Path | Record, Record] = {}
-    reasons = {}
+    records, reasons = dict[Path | Record, Record](), dict[Path | Record, str]()
     for part in dict.fromkeys(chain.from_iterable(sources)):
         try:
             records[part] = part if isinstance(part, Record) else read_record(part, **reading.options)
