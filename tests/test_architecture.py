@@ -28,13 +28,13 @@ LINES = {
     "files": 1_875,
     "charts": 2_470,
     "explore": 665,
-    "cli": 1_256,
+    "cli": 1_255,
 }
 
 #: Modules in all, and lines of a function's body.
 MOST_MODULES, MOST_LINES = 110, 90
 
-#: Names of ours that a module imports at its head.
+#: Names of ours that a module imports, in its functions too.
 MOST_NAMES = 20
 
 #: The public face, which names what lies in any folder.
@@ -103,11 +103,10 @@ def test_a_module_imports_few_names_of_ours() -> None:
     counts = {
         name: sum(
             len(node.names)
-            for node in tree.body
+            for node in ast.walk(tree)
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("slipsweep")
         )
         for name, tree in TREES.items()
-        if name not in FACE
     }
     wide = {name: count for name, count in counts.items() if count > MOST_NAMES}
     assert not wide

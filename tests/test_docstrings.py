@@ -9,7 +9,7 @@ import pytest
 import slipsweep
 
 ROOT = Path(__file__).parents[1]
-OBJECTS = sorted(name for name in slipsweep.__all__ if not name.startswith("_"))
+OBJECTS = sorted(name for name in dir(slipsweep) if not name.startswith("_"))
 
 
 def check(name: str, docstring: str) -> None:

@@ -6,18 +6,18 @@ from typing import Annotated
 
 from slipsweep.cli import common, options
 from slipsweep.cli.common import echo
-from slipsweep.cli.options import Text, Texts, command
+from slipsweep.cli.options import Text, Texts
 from slipsweep.errors import InputError
 from slipsweep.files import outputs
+from slipsweep.grid.resources import size_text
 
 TABLE = options.Panel("Table")
 
 
-@command("Read results", "slipsweep info design_chart.nc", "slipsweep info suite.nc -d 50mm --at mu_s=0.4")
+@options.command("Read results", "slipsweep info design_chart.nc", "slipsweep info suite.nc -d 50mm --at mu_s=0.4")
 def info(file: options.Result, displacement: Annotated[Texts, options.LENGTH] = None, at: options.At = None) -> None:
     """Show what a result holds, how it was made, its shares of flags, and the statistics of a suite."""
     from slipsweep.files import jobs, motions, opening, selection, storing
-    from slipsweep.grid.resources import size_text
     from slipsweep.grid.tally import tally_of
     from slipsweep.motion.records import Record
 
@@ -44,7 +44,7 @@ def info(file: options.Result, displacement: Annotated[Texts, options.LENGTH] = 
             echo(f"{name}: {lines[0]}".rstrip() if len(lines) == 1 else "\n  ".join((f"{name}:", *lines)))
 
 
-@command(
+@options.command(
     "Read results",
     "slipsweep export paper.nc -o paper.csv --words",
     "slipsweep export design_chart.nc -o t.parquet --at theta=5 --at amplitude=0.1g,0.2g,0.3g",
@@ -70,7 +70,6 @@ def export(
     """
     from slipsweep.files import export as tables
     from slipsweep.files import opening, selection
-    from slipsweep.grid.resources import size_text
 
     if output.suffix == ".xml":
         from slipsweep.studies.hazard import fragility, openquake_fragility

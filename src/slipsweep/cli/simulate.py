@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from slipsweep.cli import common, options
-from slipsweep.cli.common import echo, range_text
+from slipsweep.cli.common import echo
 from slipsweep.cli.options import BLOCK, OUTPUT, RARE, SHAKING, File, Text
 from slipsweep.errors import InputError, RunError
 from slipsweep.files import outputs
@@ -69,8 +69,8 @@ def simulate(
         output, overwrite, reads=[record] if record else [], endings=(".nc", ".csv", *common.FIGURES)
     )
     with_unit = options.in_own_units(vars(typed), model.g)
-    taken = (f"{name.replace('_', ' ')} {range_text(name, (value,), model.g)}" for name, value in with_unit.items())
-    taken_as = ", ".join(taken)
+    taken = ((name, common.range_text(name, (value,), model.g)) for name, value in with_unit.items())
+    taken_as = ", ".join(f"{name.replace('_', ' ')} {text}" for name, text in taken)
     for name in reading if record is None else ():
         raise InputError(f"{options.option_name(name)}: only with --record, the file of a recorded motion")
     if record is not None and excitation is not None:
