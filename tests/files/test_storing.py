@@ -1,5 +1,6 @@
 """A run gives the same bits whole and in chunks, in netCDF and Zarr, here and on workers, and after an interruption."""
 
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -193,6 +194,8 @@ def test_memory_is_what_is_asked_for(folder: Path, output: str) -> None:
     how: Any = {"engine": "zarr", "consolidated": False} if output.endswith("zarr") else {}
     with xr.open_dataset(folder / output, mask_and_scale=False, **how) as file:
         assert (file.validity.dtype, file.sliding_mode.dtype) == ("int16", "int8")
+        # of a store: half a million cells, about, are read at once, not thousands of small chunks
+        assert output == "a.nc" or 250_000 < math.prod(file.validity.encoding["chunks"]) < 1_000_000
 
 
 @pytest.mark.parametrize("output", ["w.nc", "w.zarr"])

@@ -37,7 +37,7 @@ from slipsweep.grid.resources import size_text
 #: A file or folder, or the address of a store.
 Place = Path | str
 
-#: Most cells of a chunk of a Zarr store within one of the run's, which is a shard of the store.
+#: Cells, about, of a chunk of a Zarr store within one of the run's, which is a shard of the store.
 _ZARR_CELLS = 500_000
 
 
@@ -232,9 +232,10 @@ class ZarrChunks(Chunks):
             # a shard for each chunk of the run, and within it chunks that are read by themselves
             shard = [self.lengths.get(str(dim), size) for dim, size in table[name].sizes.items()]
             inner = list(shard)
-            for axis in range(len(inner)):
-                if math.prod(inner) > _ZARR_CELLS:
-                    inner[axis] = 1
+            for axis, length in enumerate(shard):
+                if (cells := math.prod(inner)) > _ZARR_CELLS:
+                    parts = (one for one in range(1, length + 1) if length % one == 0)  # a shard holds whole chunks
+                    inner[axis] = length // min(parts, key=lambda count: abs(math.log(cells / count / _ZARR_CELLS)))
             encoding[name] = {"_FillValue": netcdf.fill_value(name, dtype)}
             encoding[name] |= {"chunks": inner, "shards": shard} if shard else {}
             encoding[name] |= {"compressors": [ZstdCodec(level=level)]} if level else {}

@@ -28,10 +28,9 @@ TERMS = 22
 #: Points of a cycle closer than this, as parts of it, are one; so are values of w closer than the second.
 _SAME, _ROUNDING = 1e-12, 1e-15
 
-#: Intervals, for each period of the fastest harmonic, in which zeros and turns are looked for, how many further
-#: derivatives part them by their zeros (four zeros in one interval have one of the last between them), and halvings
-#: of such an interval until nothing is left of it.
-_INTERVALS, _DEPTH, _HALVINGS = 12, 3, 54
+#: Intervals, for each period of the fastest harmonic, in which zeros and turns are looked for, the highest derivative
+#: whose zeros part them (four turns have one of them between), and halvings of an interval until nothing is left of it.
+_INTERVALS, _HIGHEST, _HALVINGS = 12, 4, 54
 
 # 80-bit numbers where the machine has them: coefficients then are right to the last digit
 _Extended = np.longdouble
@@ -58,7 +57,7 @@ def _period(waveform: Waveform) -> tuple[Sequence[float], Sequence[Derivative], 
     assert waveform.phases is not None
     fastest = max(waveform.multiples)
     wave = _sum_of_sines(waveform.amplitudes, waveform.multiples, waveform.phases)
-    turns = _sign_changes(wave, 1, _edges(0.0, 1.0, fastest))
+    turns, *_ = _sign_changes(wave, 1, _edges(0.0, 1.0, fastest))
     peak = np.abs(wave(np.array([0.0, *turns]), 0)).max()
     present = [m for a, m in zip(waveform.amplitudes, waveform.multiples, strict=True) if a]
     return (0.0, 1.0), [lambda u, order: wave(u, order) / peak], fastest, present == [1]
@@ -92,22 +91,24 @@ def _edges(low: float, high: float, fastest: int) -> Exact:
     return np.concatenate([[low], low + (high - low) * (np.arange(count) + 0.381966) / count, [high]])
 
 
-def _sign_changes(derivative: Derivative, order: int, edges: Exact, depth: int = _DEPTH) -> Exact:
-    """Places between the edges where a derivative changes its sign, ascending: bracketed, then bisected to the end.
+def _sign_changes(derivative: Derivative, lowest: int, edges: Exact) -> list[Exact]:
+    """Places between the edges where derivatives change sign, ascending, of the orders from the lowest on.
 
-    Between two places where the next derivative does so it is monotone, and passes 0 once at most: two or three
-    zeros that lie close together are told apart.
+    Bracketed, then bisected, the highest order first: between two places where the next derivative does so one is
+    monotone, and passes 0 once at most.  Zeros that lie close together are told apart.
     """
-    if depth:
-        edges = np.sort(np.concatenate([edges, _sign_changes(derivative, order + 1, edges, depth - 1)]))
-    below = derivative(edges, order) < 0
-    at = np.flatnonzero(below[:-1] != below[1:])
-    low, high = edges[at], edges[at + 1]
-    for _ in range(_HALVINGS if at.size else 0):
-        middle = 0.5 * (low + high)
-        same = (derivative(middle, order) < 0) == below[at]
-        low, high = np.where(same, middle, low), np.where(same, high, middle)
-    return np.asarray(high)
+    found: list[Exact] = []
+    for order in range(_HIGHEST, lowest - 1, -1):
+        below = derivative(edges, order) < 0
+        at = np.flatnonzero(below[:-1] != below[1:])
+        low, high = edges[at], edges[at + 1]
+        for _ in range(_HALVINGS if at.size else 0):
+            middle = 0.5 * (low + high)
+            same = (derivative(middle, order) < 0) == below[at]
+            low, high = np.where(same, middle, low), np.where(same, high, middle)
+        found.insert(0, np.asarray(high))
+        edges = np.sort(np.concatenate([edges, high]))
+    return found
 
 
 def _pieces(waveform: Waveform, n: int) -> tuple[Exact, ...]:
@@ -138,8 +139,7 @@ def _ramped(plain: Derivative, low: float, scale: Any, rate: Any) -> Derivative:
 
 def _monotone_pieces(derivative: Derivative, fastest: int, low: float, high: float) -> tuple[Exact, ...]:
     """The pieces between two places of a smooth wave: fields `start` to `coefficients` of `pieces_of`, by its cycle."""
-    edges = _edges(low, high, fastest)
-    zeros, turns = (_sign_changes(derivative, order, edges) for order in (0, 1))
+    zeros, turns, *_ = _sign_changes(derivative, 0, _edges(low, high, fastest))
     points = [low]
     for b in [*sorted(u for u in (*zeros, *turns) if u - low > _SAME and high - u > _SAME), high]:
         a = points[-1]
