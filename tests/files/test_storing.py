@@ -143,6 +143,13 @@ def test_a_run_goes_on_with_its_own_chunks_only(folder: Path, output: str, monke
     monkeypatch.undo()
     monkeypatch.setattr(storing, "_mark", noting)
 
+    identity = folder / f"{output}.part" / "identity.json"
+    kept = identity.rename(folder / "kept.json")
+    identity.mkdir()  # what cannot be read is not taken for nothing: the chunks stay
+    with pytest.raises(RunError, match="writing failed: Is a directory"):
+        stored(job_of(folder, "sweep"), path, resume=True)
+    identity.rmdir()
+    kept.rename(identity)
     report = stored(job_of(folder, "sweep"), path, resume=True)  # with the chunks it was begun with
     assert sorted(seen) == list(range(24))
     assert not report.found

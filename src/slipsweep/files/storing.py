@@ -2,11 +2,11 @@
 
 Each chunk of a run is written once, to its place in ``OUT.nc.part/result.nc`` or ``OUT.zarr.part/store``.  When it is
 there (in a netCDF file: on the disk itself), an empty file ``000012.chunk`` beside it says so; `identity.json` says
-what the chunks are of.
+what the chunks are of, and their lengths.
 
 The netCDF file is made with all but the values of its results.  Chunks change nothing else in it, so that it can be
 read whenever a run ends, and what is marked is there.  A compressed file is made of it at the end.
-A store at an address (``s3://…``) is written where it is, and has the attribute `unfinished` meanwhile.
+A store has the attribute `unfinished` meanwhile; one at an address (``s3://…``) is written where it is.
 """
 
 import json
@@ -111,7 +111,7 @@ class Chunks:
 
     def _begin(self, command: str, resume: bool, overwrite: bool) -> None:
         state = None
-        with suppress(OSError, ValueError):
+        with writing(self.path), suppress(FileNotFoundError, ValueError):
             state = json.loads(self._files.cat_file(f"{self._folder}/identity.json"))
         if state is None or overwrite:
             self._clear()

@@ -1,10 +1,10 @@
-"""The motion of the base in phase: a wave of peak 1 cut into monotone pieces, each a polynomial.
+"""The motion of the base in phase: a wave cut into monotone pieces, each a polynomial.
 
-On piece p the wave is w = top + c₁τ + c₂τ² + …, where τ is the phase counted from the piece's
+On a piece the wave is w = top + c₁τ + c₂τ² + …, where τ is the phase counted from the piece's
 anchor: that end of it at which |w| is larger.  Differences from a peak thus come out of the sum,
 not out of a subtraction of two numbers near 1, and keep their digits however small they are
 (near an anchor with c₁ = 0 they go with τ²).  A straight line is a polynomial, a plateau too, and
-smooth waves are cut so short that the series are exact to rounding (`slipsweep.motion.waveforms`, which
+smooth waves are cut so short that the series are exact to rounding (`slipsweep.motion.cutting`, which
 fills the table): one form for all waveforms.  Only the series of a plain sine has a name, and is
 evaluated by its shorter closed forms.  Times the amplitude A it is the base's acceleration x.
 """
@@ -19,7 +19,7 @@ from slipsweep.motion.pieces import Piece
 
 @scalar
 def from_top(piece: Piece, tau: float) -> float:
-    """w − top on piece p, τ from its anchor."""
+    """w − top on a piece, τ from its anchor."""
     if piece.arc:
         return -piece.top * versine(tau)
     sum_ = 0.0
@@ -30,7 +30,7 @@ def from_top(piece: Piece, tau: float) -> float:
 
 @scalar
 def from_top_and_slope(piece: Piece, tau: float) -> tuple[float, float]:
-    """w − top and dw/dτ on piece p."""
+    """w − top and dw/dτ on a piece."""
     if piece.arc:
         return -piece.top * versine(tau), -piece.top * math.sin(tau)
     sum_, slope = 0.0, 0.0
@@ -42,7 +42,7 @@ def from_top_and_slope(piece: Piece, tau: float) -> tuple[float, float]:
 
 @scalar
 def integral(piece: Piece, start: float, end: float) -> float:
-    """∫ (w − top) dτ over a part of piece p."""
+    """∫ (w − top) dτ over a part of a piece."""
     if piece.arc:
         return -piece.top * (angle_minus_sine(end) - angle_minus_sine(start))
     sum_start, sum_end = 0.0, 0.0
@@ -54,7 +54,7 @@ def integral(piece: Piece, start: float, end: float) -> float:
 
 @scalar
 def integrals(piece: Piece, start: float, end: float) -> tuple[float, float]:
-    """∫ (w − top) dτ and ∫ (end − τ)(w − top) dτ over a part of piece p."""
+    """∫ (w − top) dτ and ∫ (end − τ)(w − top) dτ over a part of a piece."""
     if piece.arc:
         sine_part = angle_minus_sine(start)
         remaining = half_square_minus_versine(end) - half_square_minus_versine(start) - sine_part * (end - start)
@@ -71,19 +71,19 @@ def integrals(piece: Piece, start: float, end: float) -> tuple[float, float]:
 
 @scalar
 def base_acceleration(piece: Piece, amplitude: float, tau: float) -> float:
-    """The base's acceleration on piece p, τ from its anchor."""
+    """The base's acceleration on a piece, τ from its anchor."""
     return amplitude * (piece.top + from_top(piece, tau))
 
 
 @scalar
 def held_gain(piece: Piece, amplitude: float, held: float, start: float, end: float) -> float:
-    """∫ (x − b) dτ for a held b on piece p: the gain of V."""
+    """∫ (x − b) dτ for a held b on a piece: the gain of V."""
     return (amplitude * piece.top - held) * (end - start) + amplitude * integral(piece, start, end)
 
 
 @scalar
 def held_integrals(piece: Piece, amplitude: float, held: float, start: float, end: float) -> tuple[float, float]:
-    """∫ (x − b) dτ and ∫ (end − τ)(x − b) dτ for a held b on piece p: gains of V and W from rest."""
+    """∫ (x − b) dτ and ∫ (end − τ)(x − b) dτ for a held b on a piece: gains of V and W from rest."""
     width = end - start
     excess = amplitude * piece.top - held
     first, second = integrals(piece, start, end)
@@ -103,7 +103,7 @@ offset_root = root_of(_beyond)
 
 @scalar
 def offset_at(piece: Piece, amplitude: float, x: float) -> float:
-    """τ at which the base's acceleration is x on piece p (the nearer end, if x lies beyond)."""
+    """τ at which the base's acceleration is x on a piece (the nearer end, if x lies beyond)."""
     far = piece.begin + piece.finish  # one of them is 0
     wanted = (x - amplitude * piece.top) / amplitude
     farthest = piece.first + piece.last - 2.0 * piece.top
@@ -124,5 +124,5 @@ def offset_at(piece: Piece, amplitude: float, x: float) -> float:
 
 @scalar
 def phase_at(piece: Piece, tau: float) -> float:
-    """The phase of τ on piece p, in the table's count."""
+    """The phase of τ on a piece, in the table's count."""
     return piece.start + (tau - piece.begin)

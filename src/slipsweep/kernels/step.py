@@ -55,7 +55,7 @@ class Steps(NamedTuple):
 class State(NamedTuple):
     """The block: V, W, its acceleration b while it slides (`held`), the largest and the least V, whether it slides.
 
-    `began` is the phase of the onset, and `growth` how long D growth from there: that limits steps (`longest_step`).
+    `began` is the phase of the onset, and `growth` how long D grows from there: that limits steps (`longest_step`).
     """
 
     velocity: float
@@ -93,12 +93,12 @@ def mean_rate(c0: float, c1: float, c2: float, s: float) -> float:
 
 
 @scalar
-def _lost(where: tuple[float, float, float, float, float], s: float) -> tuple[float, float]:
+def _minus_velocity(where: tuple[float, float, float, float, float], s: float) -> tuple[float, float]:
     velocity, h, c0, c1, c2 = where
     return -velocity - mean_rate(c0, c1, c2, s) * h * s, -h * (c0 + s * (c1 + s * c2))
 
 
-_stop = root_of(_lost)
+_stop = root_of(_minus_velocity)
 
 
 @inlined
@@ -107,7 +107,7 @@ def advance(
 ) -> tuple[float, State]:
     """One step, V += (Üg − Ü) h: the part of it that is taken, 1 but for a stop, and the block then, with b = `held`.
 
-    `start`, `middle` and `end` are Üg − Ü there.  V is largest or least where it changes its sign.
+    `start`, `middle` and `end` are Üg − Ü there.  V is largest or least where the rate changes its sign.
     """
     c0, c1, c2 = rate_polynomial(rule, start, middle, end)
     taken, velocity = 1.0, state.velocity + mean_rate(c0, c1, c2, 1.0) * h  # V += (Üg − Ü) h
@@ -130,7 +130,7 @@ def advance(
 
 @inlined
 def acceleration(how: int, yield_acceleration: float, b: float, eq4: float) -> float:
-    """Ü of a block that slides, given what it was (b) and what Eq. 4 gives: the option `rise`."""
+    """Ü of a block that slides, given what it was (b) and what Eq. 4 gives: by the option `rise`, HELD or FOLLOWED."""
     if how == physics.NEWMARK:
         return yield_acceleration
     if how == physics.MONOTONE:
@@ -140,7 +140,7 @@ def acceleration(how: int, yield_acceleration: float, b: float, eq4: float) -> f
 
 @inlined
 def eq4_rate(block: Block, x: float) -> float:
-    """Üg − Ü at Üg = x with Ü by Eq. 4 and friction by Eq. 6; for Newmark's block Ü = Üy."""
+    """Üg − Ü at Üg = x with Ü by Eq. 4 and friction by the law (Eq. 6); for Newmark's block Ü = Üy."""
     if block.rise == physics.NEWMARK:
         return x - block.yield_acceleration
     return eq.relative_acceleration(x, physics.friction(block, x), block.mu_s, block.tan_theta, block.g)
@@ -219,7 +219,7 @@ def next_event(block: Block, piece: Piece, start: Point, end: Point, state: Stat
 
 @inlined
 def begun(block: Block, at: Point, phase: float, growth: float, state: State) -> State:
-    """The block as it begins to slide (t1), after which its rate growth for a phase."""
+    """The block as it begins to slide (t1), after which its rate grows for a phase."""
     b = min(acceleration(block.rise, block.yield_acceleration, block.yield_acceleration, at.base - at.rate), at.base)
     return State(state.velocity, state.displacement, b, state.peak, state.least, True, phase, growth)
 
@@ -251,10 +251,10 @@ def slide(
     block: Block, rule: int, how: int, start: Point, middle: Point, end: Point, state: State
 ) -> tuple[float, State]:
     """One step of a block that slides: the part of it up to a stop, and the block then."""
-    least, may_stop = block.yield_acceleration, how != FOLLOWED
-    b = acceleration(how, least, state.held, start.base - start.rate)
-    b_middle = acceleration(how, least, b, middle.base - middle.rate)
-    b_end = acceleration(how, least, b, end.base - end.rate)
+    yields, may_stop = block.yield_acceleration, how != FOLLOWED
+    b = acceleration(how, yields, state.held, start.base - start.rate)
+    b_middle = acceleration(how, yields, b, middle.base - middle.rate)
+    b_end = acceleration(how, yields, b, end.base - end.rate)
     first = rate(how, start, b)
     first = max(first, 0.0) if may_stop and state.velocity == 0.0 else first  # rounding may not stop what starts here
     half, last = rate(how, middle, b_middle), rate(how, end, b_end)
@@ -263,7 +263,7 @@ def slide(
 
 @inlined
 def longest_step(per_cycle: int, phase: float, state: State) -> float:
-    """The longest step from a phase on: those of a slide shorter than steps grow from its onset on."""
+    """The longest step from a phase on: of a slide shorter than steps (64/N) `growth`, then (16/N) (φ − `began`)."""
     return max(SHARE_OF_CYCLE / per_cycle * max(state.growth, 0.25 * (phase - state.began)), LEAST_STEP)
 
 
@@ -324,7 +324,7 @@ def walk(
     base, rates = steps.workspace[0, :size], steps.workspace[1, :size]
     tabulate(block, piece, 2 * first, 0.5 * h, base, rates)
     if how != HELD and block.rise != physics.NEWMARK:
-        # a second difference of (32/N)² of what friction takes off Üg at most, or of rounding
+        # a second difference of (32/N)² of what friction makes of Üg − Ü at most, or of rounding
         most = (block.g + block.amplitude * block.tan_theta) * physics.friction(block, 0.0)
         limit = (0.5 * SHARE_OF_CYCLE / per_cycle) ** 2 * most + ROUNDING * block.amplitude
     start = point_at(block, piece, tau)
@@ -369,12 +369,12 @@ def pulse(
                 state = begun(block, top, pieces[q].start, growth, state)
         if rises:
             state = walk(block, pieces, steps, q, begin, pieces[q].finish, block.rise, state)
-        else:
-            validity = physics.KD_NOT_POSITIVE if state.sliding and state.held <= 0.0 else validity
+        elif state.sliding:
+            validity = physics.KD_NOT_POSITIVE if state.held <= 0.0 else validity
             state = walk(block, pieces, steps, q, begin, pieces[q].finish, HELD, state)
     if state.sliding and state.held <= 0.0:
         return pulses.Pulse(0.0, math.nan, math.nan, 0.0, 0.0, physics.KD_NOT_POSITIVE)
-    started = pieces[end - 1].end  # t5: Üg = 0
+    t5 = pieces[end - 1].end
     next_p, next_tau, begins = pieces.shape[0], 0.0, math.inf
     if following < wave.height.size:
         next_p, next_tau = pulses.beginning(block, wave, following)
@@ -386,8 +386,8 @@ def pulse(
                 state = walk(block, pieces, steps, q, pieces[q].begin, until, HELD, state)
     velocity, displacement = state.velocity, state.displacement
     if state.sliding and (options.recoupling != physics.INTEGRATE or begins == math.inf):
-        displacement += eq.attenuated_displacement(velocity, state.held, begins - started)
-        velocity = eq.attenuated_velocity(velocity, state.held, begins - started)
+        displacement += eq.attenuated_displacement(velocity, state.held, begins - t5)
+        velocity = eq.attenuated_velocity(velocity, state.held, begins - t5)
     return pulses.Pulse(velocity, displacement, state.peak, min(state.least, velocity), 0.0, validity)
 
 

@@ -1,8 +1,8 @@
 """Friction laws: the friction coefficient as a function of the base's acceleration.
 
-A law is a few small functions.  The stepping kernel (`kernels.step`) needs μ(|Üg|) alone and takes any law; the exact
-kernel (`kernels.exact`) needs the others, too (`FrictionLaw.missing` names those that a law lacks).  The law of the
-paper is `exponential`, Eq. 6; its original law, Eq. 5, is Eq. 6 with Δμ = 0.  To add a law: CONTRIBUTING.md.
+A law is a few small functions.  The stepping kernel (`kernels.step`) needs μ(|Üg|) alone, of any law that falls; the
+exact kernel (`kernels.exact`) needs the others, too (`FrictionLaw.missing` names those that a law lacks).  The law of
+the paper is `exponential`, Eq. 6; its original law, Eq. 5, is Eq. 6 with Δμ = 0.  To add a law: CONTRIBUTING.md.
 """
 
 import math

@@ -29,12 +29,12 @@ TERMS = 22
 _SAME, _ROUNDING = 1e-12, 1e-15
 
 #: Intervals, for each period of the fastest harmonic, in which zeros and turns are looked for, the highest derivative
-#: whose zeros part them (four turns have one of them between), and halvings of an interval until nothing is left of it.
+#: whose zeros part them (between four turns lies one of them), and halvings of an interval until nothing is left of it.
 _INTERVALS, _HIGHEST, _HALVINGS = 12, 4, 54
 
 # 80-bit numbers where the machine has them: coefficients then are right to the last digit
 _Extended = np.longdouble
-_TURN = _Extended("6.283185307179586476925286766559005768")
+_TWO_PI = _Extended("6.283185307179586476925286766559005768")
 
 Exact = NDArray[Any]
 Derivative = Callable[[Exact, int], Exact]
@@ -53,7 +53,7 @@ def _period(waveform: Waveform) -> tuple[Sequence[float], Sequence[Derivative], 
     if waveform.name == "square":
         return (0.0, 0.5, 1.0), [_line(0.0, 1.0, 0.0), _line(0.5, -1.0, 0.0)], 0, False
     if not isinstance(waveform, Harmonics):
-        return quarters, [_sum_of_sines([1.0], [1], [90.0 if waveform.name == "cosine" else 0.0])] * 4, 1, True
+        return quarters, [_sum_of_sines([1.0], [1], [{"sine": 0.0, "cosine": 90.0}[waveform.name]])] * 4, 1, True
     assert waveform.phases is not None
     fastest = max(waveform.multiples)
     wave = _sum_of_sines(waveform.amplitudes, waveform.multiples, waveform.phases)
@@ -66,7 +66,7 @@ def _period(waveform: Waveform) -> tuple[Sequence[float], Sequence[Derivative], 
 def _line(start: float, first: float, slope: float) -> Derivative:
     """A straight line from a place on, its slope by cycle."""
     line = np.polynomial.Polynomial(np.array([first, slope], _Extended))
-    return lambda u, order: line.deriv(max(order, 0))(u - _Extended(start)) / _TURN ** max(order, 0)
+    return lambda u, order: line.deriv(max(order, 0))(u - _Extended(start)) / _TWO_PI ** max(order, 0)
 
 
 def _sum_of_sines(amplitudes: Sequence[float], multiples: Sequence[int], phases: Sequence[float]) -> Derivative:
@@ -77,7 +77,7 @@ def _sum_of_sines(amplitudes: Sequence[float], multiples: Sequence[int], phases:
     def derivative(u: Exact, order: int) -> Exact:
         turns = np.mod(m * np.asarray(u, _Extended), 1) + p / 360 + _Extended(order) / 4
         quarters = np.rint(4 * turns)  # sin 2πt is exact at every quarter
-        rest = (turns - quarters / 4) * _TURN
+        rest = (turns - quarters / 4) * _TWO_PI
         quadrant = np.mod(quarters, 4)
         sines = np.where(np.mod(quadrant, 2) == 0, np.sin(rest), np.cos(rest))
         return np.asarray((a * m**order * np.where(quadrant < 2, sines, -sines)).sum(axis=0))
@@ -86,7 +86,7 @@ def _sum_of_sines(amplitudes: Sequence[float], multiples: Sequence[int], phases:
 
 
 def _edges(low: float, high: float, fastest: int) -> Exact:
-    """Intervals between two places, at none of whose ends a plain wave has a zero."""
+    """Edges of the intervals that are searched, the inner ones where no plain wave has a zero."""
     count = max(2, math.ceil(_INTERVALS * max(fastest, 1) * (high - low)))
     return np.concatenate([[low], low + (high - low) * (np.arange(count) + 0.381966) / count, [high]])
 
@@ -94,8 +94,8 @@ def _edges(low: float, high: float, fastest: int) -> Exact:
 def _sign_changes(derivative: Derivative, lowest: int, edges: Exact) -> list[Exact]:
     """Places between the edges where derivatives change sign, ascending, of the orders from the lowest on.
 
-    Bracketed, then bisected, the highest order first: between two places where the next derivative does so one is
-    monotone, and passes 0 once at most.  Zeros that lie close together are told apart.
+    Bracketed, then bisected, the highest order first: between two places where the next derivative does so this one
+    is monotone, and passes 0 once at most.  Zeros that lie close together are told apart.
     """
     found: list[Exact] = []
     for order in range(_HIGHEST, lowest - 1, -1):
@@ -123,9 +123,9 @@ def _pieces(waveform: Waveform, n: int) -> tuple[Exact, ...]:
     for low, high in itertools.pairwise(sorted(places)):
         wave = derivatives[bisect.bisect(breaks, low) - 1]
         if n + 0.5 * (low + high) < rise:
-            wave = _ramped(wave, low, (n + _Extended(low)) / rise, 1 / (rise * _TURN))
+            wave = _ramped(wave, low, (n + _Extended(low)) / rise, 1 / (rise * _TWO_PI))
         elif left - 0.5 * (low + high) < fall:
-            wave = _ramped(wave, low, (left - _Extended(low)) / fall, -1 / (fall * _TURN))
+            wave = _ramped(wave, low, (left - _Extended(low)) / fall, -1 / (fall * _TWO_PI))
         found.append(_monotone_pieces(wave, fastest, low, high))
     return tuple(map(np.concatenate, zip(*found, strict=True)))
 
@@ -133,12 +133,12 @@ def _pieces(waveform: Waveform, n: int) -> tuple[Exact, ...]:
 def _ramped(plain: Derivative, low: float, scale: Any, rate: Any) -> Derivative:
     """A wave times its ramp, a straight line: `scale` at `low`, and of slope `rate` by phase."""
     return lambda u, order: (
-        (scale + rate * (u - _Extended(low)) * _TURN) * plain(u, order) + order * rate * plain(u, order - 1)
+        (scale + rate * (u - _Extended(low)) * _TWO_PI) * plain(u, order) + order * rate * plain(u, order - 1)
     )
 
 
 def _monotone_pieces(derivative: Derivative, fastest: int, low: float, high: float) -> tuple[Exact, ...]:
-    """The pieces between two places of a smooth wave: fields `start` to `coefficients` of `pieces_of`, by its cycle."""
+    """The pieces between two places of a smooth wave: start, end, first, last, coefficients, in cycles."""
     zeros, turns, *_ = _sign_changes(derivative, 0, _edges(low, high, fastest))
     points = [low]
     for b in [*sorted(u for u in (*zeros, *turns) if u - low > _SAME and high - u > _SAME), high]:

@@ -104,7 +104,7 @@ class Suite:
     motions : tuple of Record or of Pair
         Of any length and sampling.  A suite of pairs wants an `azimuth`.
     labels : tuple of str
-        Labels in results, all different; by default the stems of the records' names.
+        Labels in results, all different; by default the stems of the records' names (of the first components').
     name : str
         What the suite is called in results.
 
@@ -180,7 +180,7 @@ class Suite:
 
     @cached_property
     def measures(self) -> dict[str, NDArray[Any]]:
-        """`variables.MOTION_COORDINATES` of every motion; of pairs without the intensity, which the azimuth makes."""
+        """`variables.MOTION_COORDINATES` of every motion; of pairs without intensities, which depend on the azimuth."""
         found: dict[str, NDArray[Any]] = {
             "motion_file": np.array([motion.attrs.get("record", "") for motion in self]),
             "motion_sha256": np.array([motion.attrs.get("record_sha256", "") for motion in self]),
@@ -203,7 +203,7 @@ class Suite:
 
     @property
     def attrs(self) -> dict[str, Any]:
-        """What results say of the suite: how many motions, and how they were read where all were read alike."""
+        """What results say of the suite: how many motions, how all were read if alike, and which are the same."""
         about: dict[str, Any] = {"suite": self.name, "motions": len(self)}
         for name in ("record_format", "record_units", "baseline"):
             values = {one.attrs.get(name) for one in self.components}
@@ -218,7 +218,7 @@ class Suite:
         return about
 
     def summary(self) -> str:
-        """One line a motion, as `Record.summary`."""
+        """One line a record, as `Record.summary`."""
         return "\n".join(one.summary() for one in self.components)
 
 
@@ -276,7 +276,7 @@ def read_suite(
 
 
 def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Reading) -> Suite:
-    """`read_suite` of paths that are relative to a folder, whatever letters its own name has."""
+    """`read_suite` of paths that are relative to a folder, whose own name is not read as a pattern."""
     sources = _sources(paths, folder)
     sources, labels = (sources, ()) if pairs is None else _paired(sources, pairs)
     records, reasons = dict[Path | Record, Record](), dict[Path | Record, str]()
@@ -298,7 +298,7 @@ def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Rea
 
 
 def _components(motion: Motion) -> tuple[Record, ...]:
-    """The two components of a pair, or what is none."""
+    """The two components of a pair, or the record alone."""
     return (motion.first, motion.second) if isinstance(motion, Pair) else (motion,)
 
 
