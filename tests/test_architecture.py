@@ -19,16 +19,16 @@ ORDER = (
 #: Lines that a folder may have, docstrings and blanks among them.  More is a reason to look for the simpler thing;
 #: whoever takes something away lowers the limit.
 LINES = {
-    "jit": 315,
+    "jit": 312,
     "model": 1_358,
     "motion": 1_785,
     "kernels": 3_150,
     "grid": 1_047,
-    "studies": 3_885,
-    "files": 1_875,
-    "charts": 2_470,
-    "explore": 665,
-    "cli": 1_255,
+    "studies": 3_883,
+    "files": 1_877,
+    "charts": 2_482,
+    "explore": 664,
+    "cli": 1_256,
 }
 
 #: Modules in all, and lines of a function's body.

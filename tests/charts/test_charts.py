@@ -201,6 +201,20 @@ def test_what_no_block_does_is_marked_and_its_share_told(lined: xr.Dataset) -> N
     assert "falls with A" not in caption(sound)
 
 
+def test_shares_of_what_is_unsound_are_those_of_all_cells() -> None:
+    """Of some 300 000 cells half are counted: to a percent or two what all of them say, on axes long and short."""
+    axes = (np.linspace(0, 20, 11), np.linspace(0.2, 0.9, 8), np.geomspace(0.5, 14, 61), np.geomspace(0.1, 20, 58))
+    result = slipsweep.sweep(*axes)
+    slides = result.permanent_displacement.where(~slipsweep.flags(result).not_recoupled) > 0
+    estimated = slides & (result.sliding_mode == 2) & slipsweep.flags(result).friction_estimated
+    expected = 100 * float(estimated.sum() / slides.sum())
+    trends, continuous = solved.unsound_texts(result)
+    share, counted = re.findall(r"^([\d.]+) % .* \(counted in (\d+) cells, evenly spaced\)$", continuous)[0]
+    assert abs(float(share) - expected) < 1.5
+    assert 100_000 < int(counted) < 250_000
+    assert trends.startswith("the displacement falls with A in ")
+
+
 # -------------------------------------------------------------------- curves
 
 

@@ -167,6 +167,8 @@ def test_sensors_at_fault(clean: dict[str, xr.Dataset]) -> None:
     assert second.endswith("give drift = 'relative_displacement'.")
     assert found.attrs["model_table"].startswith("# WARNING: not ready for use.\n# The misfit is larger")
     assert found.attrs["uncertainty_table"] == ""
+    caption = " ".join(found.slipsweep.chart().get_supxlabel().split())
+    assert caption.startswith("Not ready for use. The misfit is larger than the noise of the sensors: ")
     test.ground_acceleration.values[:] += 0.2
     drift = 0.2 * float(np.ptp(test.time.values))
     for drifts in ("relative_displacement", "all"):

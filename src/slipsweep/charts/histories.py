@@ -129,7 +129,13 @@ def calibration(result: Result, options: Options) -> Figure:
     drawing = Drawing(options, len(labels), len(tests), (width, 9.0), sharey=False)
     for test, panels in zip(tests, drawing.grid.T, strict=True):
         _draw_test(test.isel({test["time"].dims[0]: test["computed_ground_acceleration"].notnull().values}), panels)
-    return _finish(drawing, labels, [table.attrs["constant_friction"], _parameters(table)])
+    attrs, texts = table.attrs, [table.attrs["constant_friction"]]
+    if attrs["model_table"].startswith("# WARNING"):  # what `calibrate` comments out must not be read off a figure
+        texts.append(f"Not ready for use. {attrs['findings'].splitlines()[0]}")
+    texts.append(_parameters(table))
+    if attrs["removed"] != "nothing":
+        texts.append(f"Taken off what was measured: {attrs['removed']}")
+    return _finish(drawing, labels, texts)
 
 
 def _draw_test(table: xr.Dataset, panels: Sequence[Axes]) -> None:

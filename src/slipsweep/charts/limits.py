@@ -137,6 +137,8 @@ def hazard(result: Result, options: Options) -> Figure:
     if len(names) == 1:  # the caption has what the curve is of
         drawing.legend.clear()
     texts = [style.caption(rates, options), f"hazard curve: {style.plain(rates.attrs['hazard_curve'])}"]
+    if marks.all():
+        texts.append("Rates are computed at the markers; between them the lines are straight.")
     if (held > 0.5 * lines).any():
         ends = [float(rates.attrs[f"{name}_range"][-1]) for name in ("amplitude", "hazard_curve")]
         what = "the largest amplitude of the sweep" if ends[0] < ends[1] else "the end of the hazard curve"

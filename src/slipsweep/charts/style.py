@@ -225,6 +225,8 @@ def model_text(attributes: Mapping[Any, Any]) -> str:
     words = [_WORDS[model.name], *(_WORDS[value] for value in model.options.values() if value in _WORDS)]
     recorded = next((name for name in ("record", "suite") if name in attributes), None)
     shaking = f"{recorded} {plain(attributes[recorded])}" if recorded else WAVEFORMS.from_attributes(attributes)
+    if "record_accepted" in attributes:
+        shaking = f"{shaking}\naccepted: {plain(attributes['record_accepted'])}"
     inputs = [plain(attributes["friction_inputs"])] if "friction_inputs" in attributes else []
     return "\n".join([*inputs, f"{', '.join(words)}; {shaking}"])
 

@@ -122,6 +122,7 @@ def calibrate(
     common.write_outputs(paths, overwrite, table, toml=lambda: text)
     if quiet:
         return
+    echo(*["not ready for use: see the notes below"] if text.startswith("# WARNING") else [])
     _echo_coefficients(table)
     _echo_parameters(table)
     echo(f"removed: {table.attrs['removed']}")
@@ -150,10 +151,10 @@ def _echo_parameters(table: "xr.Dataset") -> None:
     from slipsweep.motion.shaking import RESPONSES
     from slipsweep.studies.likelihood import SOUGHT
 
-    columns = ["value", "error", "95 % from", "to"]
-    rows = [[table[one], table[f"{one}_error"], *table[f"{one}_interval"]] for one in SOUGHT]
-    found = pd.DataFrame(rows, [f"{one} ({table[one].attrs['units']})" for one in SOUGHT], columns, dtype=float)
-    found.loc[~(found["error"] < math.inf), columns[:2]] = math.nan  # the data do not determine it
+    # no value where the data do not determine one
+    rows = [[table[one].where(table[f"{one}_error"] < math.inf), *table[f"{one}_interval"]] for one in SOUGHT]
+    labels = [f"{one} ({table[one].attrs['units']})" for one in SOUGHT]
+    found = pd.DataFrame(rows, labels, ["value", "95 % from", "to"], dtype=float)
     echo(_text(found), "correlation", _text(pd.DataFrame(table["correlation"].values, [*SOUGHT], [*SOUGHT])))
     echo("misfit, root mean square, and in parts of the largest value")
     for name in (one for one in RESPONSES if f"misfit_{one}" in table):

@@ -111,6 +111,8 @@ def _open(path: str | os.PathLike[str]) -> xr.Dataset:
         return table[[name for name in order if name in table.variables]]
     if not place.exists():
         raise InputError(f"{path}: no such file")
+    if place.suffix == ".toml":
+        raise InputError(f"{path}: is a sweep file, not a result; slipsweep run {path} makes one")
     if not place.is_file():
         raise InputError(f"{path}: is neither a netCDF file nor a Zarr store of format 3")
     try:

@@ -129,7 +129,7 @@ def _check_interface(model: Model, given: Mapping[str, Any]) -> None:
     if not isinstance(model, Newmark):
         raise InputError(
             f"yield_coefficient: not allowed with model = {model.name!r}, whose friction needs theta and mu_s; "
-            "only with model = 'newmark'"
+            "only with model = 'newmark'; here give yield_acceleration"
         )
     for name in known.INTERFACE_INPUTS:
         if name in given:

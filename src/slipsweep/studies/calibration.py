@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from threadpoolctl import threadpool_limits
 
 from slipsweep.errors import InputError
 from slipsweep.model import options, parameters, variables
@@ -107,19 +108,20 @@ def calibrate(
     def observed(*more: str) -> list[Observation]:
         return [Observation(one, theta, mu_s, chosen, offset, drift, noise or {}, more) for one in tests]
 
-    observations = observed()
-    found = estimate(observations)
-    if "continuous" not in found.readings:
-        for one in observations:
-            one.leave_out_upslope_slips()
-        if any(one.upslope for one in observations):
-            found = estimate(observations)
-    statics = [_statics(one) for one in observations]
-    constant = next((one for one in statics if one.attrs["constant_friction"]), None)
-    misfit = [] if constant is not None else _misfit(found, lambda name: estimate(observed(name)))
-    parts = [_of_test(one, found, cycles) for one in observations]
-    whole = parts[0] if len(parts) == 1 else xr.concat(parts, "test", join="outer", combine_attrs="override")
-    whole = whole.merge(_of_all(found)).assign(statics[0].variables)
+    with threadpool_limits(1, "blas"):  # its threads wait for each other: ten times as long on a busy machine
+        observations = observed()
+        found = estimate(observations)
+        if "continuous" not in found.readings:
+            for one in observations:
+                one.leave_out_upslope_slips()
+            if any(one.upslope for one in observations):
+                found = estimate(observations)
+        statics = [_statics(one) for one in observations]
+        constant = next((one for one in statics if one.attrs["constant_friction"]), None)
+        misfit = [] if constant is not None else _misfit(found, lambda name: estimate(observed(name)))
+        parts = [_of_test(one, found, cycles) for one in observations]
+        whole = parts[0] if len(parts) == 1 else xr.concat(parts, "test", join="outer", combine_attrs="override")
+        whole = whole.merge(_of_all(found)).assign(statics[0].variables)
     whole.attrs = {
         "title": "Calibration of a sliding block from tests on a shaking table",
         **friction.SOURCE,

@@ -152,9 +152,7 @@ def suite_dims(values: xr.DataArray, over: Any = None) -> tuple[str, ...]:
     """The dimensions that make up the suite: those in `over`, or `SUITE`; InputError: `motion` is not among them."""
     there = tuple(map(str, values.dims))
     if "motion" not in there:
-        raise InputError(
-            f"result: dimensions {', '.join(there) or 'none'}: must have motion, as a result of a suite has"
-        )
+        raise InputError(f"result: dimensions {', '.join(there) or 'none'}: must have motion, or be of [uncertainty]")
     if over is None:
         return tuple(dim for dim in SUITE if dim in there)
     dims: Sequence[Any] = [over] if isinstance(over, str) else check_list("over", over, "dimensions")
