@@ -103,7 +103,7 @@ def drawn_thresholds(data: xr.Dataset, requested: Floats) -> Floats:
 def hazard(result: Result, options: Options) -> Figure:
     """The mean annual rate of exceedance over the displacement, a curve for each grid point.
 
-    The displacements that the attribute ``marked`` has, by default all if they are few, have a marker.  Curves are
+    The displacements that the attribute ``marked`` has, or all if they are few, have a marker.  Curves are
     dotted where more than half of the rate is held above the largest amplitude.
     """
     rates = result.data
@@ -114,7 +114,8 @@ def hazard(result: Result, options: Options) -> Figure:
         most = f"a chart shows {_MOST_CURVES} at most; cut axes with --at NAME=VALUE"
         raise InputError(f"{len(names)} grid points: {most}")
     wanted = rates["threshold"].values
-    marks = np.isin(wanted, rates.attrs.get("marked", wanted if wanted.size <= _MOST_MARKS else []))
+    few = wanted.size <= _MOST_MARKS
+    marks = np.isin(wanted, wanted if few else rates.attrs.get("marked", []))
     lines, held = (rates[name].values.reshape(-1, wanted.size) for name in ("annual_rate", "held_rate"))
     if not (lines[:, marks if marks.any() else slice(None)] > 0.0).any():
         raise InputError("no motion exceeds any of the given displacements: there is nothing to draw")
@@ -137,7 +138,7 @@ def hazard(result: Result, options: Options) -> Figure:
     if len(names) == 1:  # the caption has what the curve is of
         drawing.legend.clear()
     texts = [style.caption(rates, options), f"hazard curve: {style.plain(rates.attrs['hazard_curve'])}"]
-    if marks.all():
+    if few:
         texts.append("Rates are computed at the markers; between them the lines are straight.")
     if (held > 0.5 * lines).any():
         ends = [float(rates.attrs[f"{name}_range"][-1]) for name in ("amplitude", "hazard_curve")]
