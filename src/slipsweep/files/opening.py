@@ -111,8 +111,6 @@ def _open(path: str | os.PathLike[str]) -> xr.Dataset:
         return table[[name for name in order if name in table.variables]]
     if not place.exists():
         raise InputError(f"{path}: no such file")
-    if place.suffix == ".toml":
-        raise InputError(f"{path}: is a sweep file, not a result; slipsweep run {path} makes one")
     if not place.is_file():
         raise InputError(f"{path}: is neither a netCDF file nor a Zarr store of format 3")
     try:
@@ -120,7 +118,8 @@ def _open(path: str | os.PathLike[str]) -> xr.Dataset:
     except PermissionError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     except Exception as error:  # netCDF4 and xarray raise what they like on a damaged file
-        raise InputError(f"{path}: not a netCDF file, or a damaged one ({_first_line(error)})") from None
+        made = "; of a sweep file slipsweep run makes one" if place.suffix == ".toml" else ""
+        raise InputError(f"{path}: not a netCDF file, or a damaged one ({_first_line(error)}){made}") from None
 
 
 def check_zarr(path: object) -> None:
