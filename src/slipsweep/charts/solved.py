@@ -26,8 +26,9 @@ DRIVES = ("amplitude", "displacement_amplitude")
 
 DISPLACEMENT = "permanent_displacement"
 
-#: Most cells of a result that are looked at for what is unsound.
-_LOOKED_AT = 250_000
+#: Most cells of a result that are looked at for what is unsound, and of one whose cells take ten times as long or more:
+#: by steps, or under another waveform than a sine.
+_LOOKED_AT, _LOOKED_AT_OTHERS = 250_000, 25_000
 
 _BLOCK = ("theta", "mu_s", "yield_acceleration")
 
@@ -154,8 +155,10 @@ def unsound_texts(results: xr.Dataset) -> list[str]:
     drives = {*STRENGTHS, "displacement_amplitude"}
     if DISPLACEMENT not in results or drives.isdisjoint(results.coords) or is_newmark(results):
         return []
+    how = (results.attrs.get("waveform"), results.attrs.get(SOLVERS.attribute, "cycle"))
+    others = not is_recorded(results) and how != ("sine", "cycle")
     some, counted = results, ""
-    while some[DISPLACEMENT].size > _LOOKED_AT:
+    while some[DISPLACEMENT].size > (_LOOKED_AT_OTHERS if others else _LOOKED_AT):
         sizes = some[DISPLACEMENT].sizes
         some = some.isel({max(sizes, key=lambda dim: sizes[dim]): slice(1, None, 2)})
         counted = f" (counted in {some[DISPLACEMENT].size} cells, evenly spaced)"
