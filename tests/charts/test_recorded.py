@@ -241,6 +241,7 @@ def test_every_half_wave_of_a_history_has_its_mode() -> None:
     record = slipsweep.read_record(SWEEPS / "data" / "synthetic.csv")
     given: dict[str, Any] = {"excitation": record, "scale": 2.5, "time_scale": 2.0, "polarity": -1}
     history = slipsweep.simulate(5.0, 0.35, **given)
+    assert history.half_wave_peak.units == history.ground_acceleration.units == "m s-2"
     modes = history.half_wave_mode.values
     assert np.count_nonzero(modes == 1) == history.stick_slip_pulses
     assert np.count_nonzero(modes == 2) == history.continuous_pulses

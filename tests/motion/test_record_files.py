@@ -199,6 +199,7 @@ def test_a_trace_of_obspy() -> None:
     np.testing.assert_allclose(record.acceleration, 0.3 * SHAKING, rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(record.times, TIMES, rtol=1e-15)
     assert (record.name, record.attrs["record_units"]) == ("XX.ABC..HNE", "cm/s2")
+    assert abs(Record.from_obspy(trace(SHAKING + 0.01), "m/s2", baseline="mean").acceleration.mean()) < 1e-12
     masked = np.ma.masked_array(SHAKING, np.arange(1001) == 500)
     with pytest.raises(InputError, match=r"XX\.ABC\.\.HNE: 1 fill value \(blank\), first at t = 5 s"):
         Record.from_obspy(trace(masked), "m/s2")

@@ -142,6 +142,9 @@ def test_coulombs_block_is_newmarks(kinetic: float) -> None:
     onset = 9.81 * np.tan(np.arctan(kinetic) - np.radians(6.0))
     (value,) = re.findall(r"yield_acceleration = ([\d.]+)", found.attrs["model_table"])
     assert float(value) == pytest.approx(onset, rel=0.02)
+    (ends,) = re.findall(r"95 %: ([\d.]+) to ([\d.]+)", found.attrs["model_table"])
+    (scale,) = re.findall(r"scale = ([\d.]+)", found.attrs["uncertainty_table"])
+    assert 3.92 * float(scale) == pytest.approx(float(ends[1]) - float(ends[0]), rel=0.1)
 
 
 @pytest.mark.parametrize("missing", ["block_acceleration", "relative_velocity"])

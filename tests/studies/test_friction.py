@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from scipy import stats
 
 import slipsweep
 from slipsweep import InputError
 from slipsweep.model import equations
-from slipsweep.studies.friction import eq1_friction
+from slipsweep.studies.friction import _mean, eq1_friction
 from tests.support.shaking import CONTINUOUS, STICK_SLIP, coulomb, exact, measured
 
 GIVEN = {"theta": STICK_SLIP["theta"], "mu_s": STICK_SLIP["mu_s"]}
@@ -24,6 +25,11 @@ def stick_slip() -> xr.Dataset:
 
 def friction(test: Any, **options: Any) -> xr.Dataset:
     return slipsweep.measured_friction(test, **{**GIVEN, **options})
+
+
+def test_few_slides_have_the_interval_of_student() -> None:
+    values = np.array([0.2, 0.3, 0.4])
+    np.testing.assert_allclose(_mean(values, 0.0, 0.0)[[0, 2]], stats.t.interval(0.95, 2, 0.3, stats.sem(values)))
 
 
 def test_friction_is_that_of_the_simulation(stick_slip: xr.Dataset) -> None:

@@ -174,6 +174,7 @@ def test_statuses_without_a_limit() -> None:
     assert limits.permanent_displacement.isnull().all()
     assert (limits.sliding_mode == SlidingMode.MISSING).all()
     assert limits.validity[1].item() & Validity.STATICALLY_UNSTABLE
+    assert limit_amplitude(1e6, 12, 0.3, 1.0, maximum_amplitude=60.0).validity.item() & Validity.UPLIFT  # at its end
     assert limit_amplitude("50mm", 5, 0.3, 1.0).displacement == 0.05
     # never beyond the end of the search: yield lies above it
     assert limit_amplitude(0.01, 0, 0.5, 1.0, maximum_amplitude=1.0).limit_status == LimitStatus.NOT_REACHED

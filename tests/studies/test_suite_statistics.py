@@ -47,6 +47,8 @@ def test_by_hand() -> None:
     assert found.flag.values.tolist() == [int(flag) for flag in REASONS]
     assert int(CAUTION) not in found.flag
     np.testing.assert_array_equal(found.zero_probability, [0.5, 1.0, nan, 0.0, 0.8])
+    upslope = suite_statistics(suite_result([[-0.1, 0.0, 0.2, 0.4]], [[0] * 4], ("mu_s", "motion")))
+    assert upslope.zero_probability == 0.5  # a displacement upslope is none, too
     np.testing.assert_allclose(found.nonzero_median, [0.25, nan, nan, 0.2, 0.3])
     np.testing.assert_allclose(found.nonzero_geometric_mean, [0.2, nan, nan, 0.2, 0.3])
     np.testing.assert_allclose(found.log_standard_deviation, [np.log(4.0) / np.sqrt(2.0), nan, nan, nan, nan])
