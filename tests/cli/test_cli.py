@@ -128,6 +128,7 @@ def test_a_sweep_from_standard_input(tmp_path: Path) -> None:
         (("run", "named.toml"), "b.pdf: the name must end in one of .nc, .zarr"),
         (("explore", "small.nc", "-o", "a.pdf"), "a.pdf: the name must end in one of .html, .htm"),
         (("info", "none.nc"), "none.nc: no such file"),
+        (("info", "small.toml"), "small.toml: not a netCDF file"),
         (("info", "small.toml"), "); of a sweep file slipsweep run makes one"),
         ((*SIMULATE, "-o", "a.txt"), "a.txt: the name must end in one of .nc, .csv, .png, .svg, .pdf"),
         ((*SIMULATE, "-o", "small.csv"), "small.csv: exists already"),

@@ -157,11 +157,11 @@ def unsound_texts(results: xr.Dataset) -> list[str]:
         return []
     how = (results.attrs.get("waveform"), results.attrs.get(SOLVERS.attribute, "cycle"))
     others = not is_recorded(results) and how != ("sine", "cycle")
-    some, counted = results, ""
+    some = results
     while some[DISPLACEMENT].size > (_LOOKED_AT_OTHERS if others else _LOOKED_AT):
         sizes = some[DISPLACEMENT].sizes
         some = some.isel({max(sizes, key=lambda dim: sizes[dim]): slice(1, None, 2)})
-        counted = f" (counted in {some[DISPLACEMENT].size} cells, evenly spaced)"
+    counted = "" if some is results else f" (counted in {some[DISPLACEMENT].size} cells, evenly spaced)"
     some = some.load()
     drawn = reliable(some, DISPLACEMENT)
     texts = [unsound(some.assign({DISPLACEMENT: drawn}), drawn, newmark(some))[1]]

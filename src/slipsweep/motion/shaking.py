@@ -78,17 +78,17 @@ class ShakingTest:
         begins and ends at rest.  Also returns what was taken off each: its value at the first sample, and its slope.
         """
         offset, drift = (check_channels(*one, self.channels) for one in (("offset", offset), ("drift", drift)))
-        chosen = np.ones(self.times.size, dtype=bool)
+        chosen, within = np.ones(self.times.size, dtype=bool), ""
         if rest is not None:
             bounds = [check_finite("rest", one) for one in check_list("rest", rest, "two times")]
             if len(bounds) != 2:
                 raise InputError(f"rest = {shown(rest)}: must be two times, s")
-            chosen = (self.times >= bounds[0]) & (self.times <= bounds[1])
+            chosen, within = (self.times >= bounds[0]) & (self.times <= bounds[1]), f"rest = {shown(rest)}: "
         channels, removed, since = dict(self.channels), [], self.times - self.times[0]
         for name in (one for one in CHANNELS if one in (*offset, *drift)):
             use = chosen & np.isfinite(channels[name])
             if use.sum() < 3:
-                raise InputError(f"{name}: {use.sum()} samples to fit to between the times of rest: at least 3")
+                raise InputError(f"{within}{name}: {use.sum()} samples to fit to: must be at least 3")
             line = np.polynomial.Polynomial.fit(since[use], channels[name][use], 1 if name in drift else 0)
             channels[name] = channels[name] - line(since)
             constant, slope = (float(one(0.0)) for one in (line, line.deriv()))
