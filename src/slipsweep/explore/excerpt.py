@@ -1,8 +1,8 @@
-"""What a page shows of a result: an evenly spaced part of it, small enough for a page, and some of its histories."""
+"""What a page shows of a result: an evenly spaced part of it, small enough for a page."""
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +16,7 @@ from slipsweep.charts.solved import with_amplitude
 from slipsweep.errors import InputError
 from slipsweep.files.opening import open_result
 from slipsweep.files.selection import axis_labels, axis_numbers
-from slipsweep.model.options import MODELS
 from slipsweep.model.variables import PARAMETERS, RESULTS, STATISTIC_COORDINATES, STATISTICS, STRENGTHS
-from slipsweep.motion.waveforms import WAVEFORMS
-from slipsweep.studies.history import simulate
 from slipsweep.studies.suite_statistics import suite_statistics
 
 #: What can be chosen for the map, in the order in which it is offered, and in words that fit on a phone.
@@ -39,11 +36,6 @@ _WHOLE = ("polarity", "motion", "quantile", "threshold")
 
 #: Largest magnitude of a coordinate: products of a few of them are still numbers.
 _MOST = 1e75
-
-#: Points a cycle, and how many cycles at most.
-POINTS, CYCLES = 64, 3
-
-_COLUMNS = ("block_acceleration", "relative_velocity", "relative_displacement")
 
 _VERTICAL = ("amplitude", "displacement_amplitude", *STRENGTHS[1:])
 
@@ -172,67 +164,3 @@ def _coordinates(path: Path, table: xr.Dataset) -> dict[str, Any]:
         if not (np.abs(values) < _MOST).all():
             raise InputError(f"{path}: {name}: values are missing, or too large to draw")
     return coords
-
-
-@dataclass(frozen=True)
-class Histories:
-    """Time histories of some cells over phase, from which the page scales them to any frequency: those at ω = 1 rad/s.
-
-    `keep` has the dimensions that histories depend on, and the indices of the excerpt that have them.  `phase` (rad)
-    has the points of `cycles` cycles, `ground` the ground acceleration over its amplitude.  `values`, of shape
-    (..., quantity, point), are block acceleration, relative velocity and displacement in units of `scale`, of shape
-    (..., quantity), which is NaN where a cell has no history.
-    """
-
-    keep: dict[str, NDArray[np.intp]]
-    phase: NDArray[np.float64]
-    ground: NDArray[np.float64]
-    values: NDArray[np.int16]
-    scale: NDArray[np.float32]
-    cycles: int
-
-
-def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
-    """Compute the histories of as many cells, evenly spaced, as fit into `most_bytes`.
-
-    They depend on time through the phase only: v(f) = V/ω and u(f) = W/ω², so that one history serves all frequencies
-    and the page scales it (MODEL, motion rules).  None where the shaking is not periodic or ends with a ramp beyond the
-    cycles shown, where inputs are uncertain, or where not even one history fits.
-    """
-    table = excerpt.table
-    if "waveform" not in table.attrs or "permanent_displacement" not in table:
-        return None
-    motion = WAVEFORMS.from_attributes(table.attrs)
-    if motion.cycles > CYCLES and motion.ramp_out > 0.0:
-        return None  # the first cycles alone have no ramp at their end
-    others = ("phi", "frequency", "displacement_amplitude", "structure_frequency", "quantile", "threshold")
-    inputs = {str(name): one.variable for name, one in table.coords.items() if name not in others}  # phi: by mu_s
-    depends = {str(dim) for variable in inputs.values() for dim in variable.dims}
-    sizes = {dim: size for dim, size in excerpt.sizes.items() if dim in depends}
-    cycles = min(motion.cycles, CYCLES)
-    motion, model = replace(motion, cycles=cycles), MODELS.from_attributes(table.attrs)
-    points = POINTS * cycles + 1
-    most = most_bytes // (len(_COLUMNS) * (2 * points + 4))
-    # every position of the sliders has some, if they fit
-    left = thinned_lengths(sizes, most, excerpt.map_dims, sizes.keys() - {*excerpt.map_dims})
-    left = thinned_lengths(left, most, excerpt.map_dims)
-    if math.prod(left.values()) > most:
-        return None
-    keep = {dim: evenly(length, left[dim]) for dim, length in sizes.items()}
-    phase = np.linspace(0.0, 2.0 * math.pi * cycles, points)
-    ground = np.zeros(points)
-    values = np.zeros((*left.values(), len(_COLUMNS), points), np.int16)
-    scale = np.full((*left.values(), len(_COLUMNS)), np.nan, np.float32)
-    for at in np.ndindex(*left.values()):
-        cell = {dim: int(keep[dim][i]) for dim, i in zip(keep, at, strict=True)}
-        given: dict[str, Any] = {name: one.isel(cell, missing_dims="ignore").item() for name, one in inputs.items()}
-        history = simulate(times=phase, excitation=motion, model=model, frequency=1.0 / (2.0 * math.pi), **given)
-        columns = np.array([history[name].values for name in _COLUMNS])
-        if np.isfinite(columns).all():
-            largest = np.abs(columns).max(axis=1)
-            scale[at] = largest / 32767.0
-            with np.errstate(invalid="ignore"):
-                values[at] = np.where(largest[:, None] > 0.0, columns / largest[:, None] * 32767.0, 0.0).round()
-            if given["amplitude"] > 0.0:
-                ground = history["ground_acceleration"].values / given["amplitude"]
-    return Histories(keep, phase, ground, values, scale, cycles)

@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 
 from slipsweep.charts.style import SYMBOLS, caption, is_acceleration, unit
 from slipsweep.errors import InputError
-from slipsweep.explore.excerpt import LAYERS, POINTS, SHOWN, Excerpt, Histories, compute_histories, read_excerpt
+from slipsweep.explore.excerpt import LAYERS, SHOWN, Excerpt, read_excerpt
 from slipsweep.explore.figures import decades, figures, label, scale_of
+from slipsweep.explore.histories import POINTS, Histories, compute_histories
 from slipsweep.files import outputs
 from slipsweep.files.selection import axis_numbers
 from slipsweep.grid.resources import size_text
@@ -34,7 +35,7 @@ PAGE_BYTES = 10_000_000
 #: Of the bytes that Bokeh leaves, the share that cells may take; histories have the rest.
 _CELLS_SHARE = 0.75
 
-#: Some thousands of histories: beyond them another one shows nothing new, and takes 0.8 ms to compute.
+#: Some thousands of histories: beyond them another one shows nothing new.
 _HISTORIES_BYTES = 4_500_000
 
 #: Powers by which displacements follow from one frequency to others, and from one time scale (MODEL, motion rules).
