@@ -22,12 +22,12 @@ LINES = {
     "jit": 312,
     "model": 1_358,
     "motion": 1_785,
-    "kernels": 3_150,
+    "kernels": 3_148,
     "grid": 1_047,
     "studies": 3_883,
     "files": 1_877,
     "charts": 2_486,
-    "explore": 664,
+    "explore": 694,
     "cli": 1_256,
 }
 

@@ -80,7 +80,7 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
     problem, wave = Problem(model, motion, Cycle()), wave_of(motion)
     fields = engine.cell_inputs(problem, plan.coords)
     cells = {name: fields.get(name, xr.Variable((), math.nan)).set_dims(left).values for name in Cell._fields}
-    shared = solvers.options_of(problem, wants_peak=True), wave, workspace_of(wave, keeps_log=True), False
+    shared = solvers.options_of(problem, wants_peak=True), wave, workspace_of(wave, keeps_log=True)
     phase = np.linspace(0.0, 2.0 * math.pi * cycles, points)
     ground = np.zeros(points)
     values = np.zeros((*left.values(), len(_COLUMNS), points), np.int16)

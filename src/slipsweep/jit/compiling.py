@@ -79,18 +79,18 @@ def _compiled(function: Callable[..., Any], types: tuple[Any, ...]) -> Any:
 
 def _compiled_in(folder: Path | None, function: Callable[..., Any], types: tuple[Any, ...]) -> Any:
     global seconds
+    kept = folder is not None and any(folder.glob(f"**/*.{function.__name__}-*.nbi"))
+    if not kept:
+        announce(function.__name__)
+    started = time.perf_counter()
     given, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
     try:
-        compiled: Any = part("arcp", cache=folder is not None)(function)
+        # with its types it is compiled at once, and for no others
+        compiled = part("arcp", cache=folder is not None, signature_or_function=[types])(function)
     finally:
         numba.config.CACHE_DIR = given
-    if folder is not None and any(folder.glob(f"**/*.{function.__name__}-*.nbi")):
-        compiled.compile(types)
-        return compiled
-    announce(function.__name__)
-    started = time.perf_counter()
-    compiled.compile(types)
-    seconds += time.perf_counter() - started
+    if not kept:
+        seconds += time.perf_counter() - started
     return compiled
 
 

@@ -257,15 +257,10 @@ def _relative_acceleration_and_slope(block: Block, x: float) -> tuple[float, flo
     return x - value, 1.0 - slope
 
 
-_response_root = root_of(_response_above)
+#: x at which E is a level, given (block, level).
+response_root = root_of(_response_above)
 _slope_root = root_of(_slope_above)
 _relative_acceleration_root = root_of(_relative_acceleration_and_slope)
-
-
-@scalar
-def response_root(block: Block, level: float, below: float, above: float) -> float:
-    """x between `below`, where E < level, and `above`, at which E = level."""
-    return _response_root((block, level), below, above, above, 0.0)
 
 
 @scalar

@@ -222,7 +222,7 @@ def next_stage(block: Block, x: float, top: float, held: float, follows: bool) -
         return RiseStage(end, True, True)
     crosses = physics.response(block, end) > held
     if crosses:
-        end = physics.response_root(block, held, inner, end)
+        end = physics.response_root((block, held), inner, end, end, 0.0)
     if x < held < end:  # from there on V grows
         return RiseStage(held, False, False)
     return RiseStage(end, False, crosses)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from slipsweep.jit.compiling import kernel
-from slipsweep.jit.decorators import scalar
+from slipsweep.jit.decorators import scalar, single
 from slipsweep.kernels import block as physics
 from slipsweep.kernels import exact
 from slipsweep.kernels import record as recorded
@@ -69,23 +69,6 @@ def fill_base(amplitude: float, cycles: int, wave: Wave, phases: np.ndarray, fou
                 p += 1
             tau = min(max(pieces[p].begin + (phi - pieces[p].start), pieces[p].begin), pieces[p].finish)
             found.ground_acceleration[at] = base_acceleration(pieces[p], amplitude, tau)
-
-
-@scalar
-def rest(found: History) -> None:
-    """Fill a history in which the block moves with the base."""
-    for at in range(found.velocity.size):
-        found.block_acceleration[at] = found.ground_acceleration[at]
-        found.velocity[at] = found.displacement[at] = 0.0
-
-
-@scalar
-def fill_friction(block: Block, found: History) -> None:
-    """Fill what Eq. 1 gives for the accelerations of base and block."""
-    for at in range(found.velocity.size):
-        found.friction_coefficient[at] = eq.mobilised_friction(
-            found.ground_acceleration[at], found.block_acceleration[at], block.mu_s, block.tan_theta, block.g
-        )
 
 
 @scalar
@@ -154,8 +137,7 @@ def fill_pulses(
     """Fill Ü, V and W pulse by pulse; of a record each has the friction of its own peak."""
     at, velocity, displacement = 0, 0.0, 0.0
     k, repeat = first_pulse(block, wave, 0), 0
-    intervals = wave.height.size
-    while at < phases.size and k < intervals:
+    while at < phases.size and k < wave.height.size:
         following, peak, continuous = first_pulse(block, wave, k + 1), block.amplitude * wave.height[k], False
         if is_record:
             block, interface = recorded.block_in_pulse(exponential(), cell, options, peak)
@@ -167,7 +149,7 @@ def fill_pulses(
         at = sample_log(block, wave, log, until, 2.0 * math.pi * repeat, before, phases, at, found)
         velocity, displacement = now.velocity, displacement + now.displacement
         # the plain cycle of the table comes again and again
-        again = following < intervals and wave.interval[following, 0] >= wave.cycle[wave.lead + 1]
+        again = following < wave.height.size and wave.interval[following, 0] >= wave.cycle[wave.lead + 1]
         if again and repeat < wave.repeats - 1:
             repeat += 1
             following = first_pulse(block, wave, 0)
@@ -205,18 +187,39 @@ def fill_cycles(
         found.velocity[after], found.displacement[after] = velocity, displacement
 
 
-@kernel
-def fill_history(
+@single
+def fill(
     cell: physics.Cell, options: Options, wave: Wave, workspace: Workspace, is_record: bool, phases: np.ndarray,
     found: History,
 ) -> None:  # fmt: skip
-    """Fill a history at increasing phases; of a record at times, at time scale 1, `cell.amplitude` the factor on it."""
+    """Fill a history; where the block does not slide it moves with the base."""
     peak = cell.amplitude * wave.highest if is_record else cell.amplitude
     block, interface = recorded.block_in_pulse(exponential(), cell, options, peak)
     fill_base(cell.amplitude, options.cycles, wave, phases, found)
-    rest(found)
+    for at in range(phases.size):
+        found.block_acceleration[at] = found.ground_acceleration[at]
+        found.velocity[at] = found.displacement[at] = 0.0
     if is_record or interface.sliding_mode == eq.STICK_SLIP:
         fill_pulses(cell, block, options, wave, workspace, is_record, phases, found)
     elif interface.sliding_mode == eq.CONTINUOUS:
         fill_cycles(block, options.cycles, wave, workspace, phases, found)
-    fill_friction(block, found)
+    for at in range(phases.size):
+        found.friction_coefficient[at] = eq.mobilised_friction(  # Eq. 1
+            found.ground_acceleration[at], found.block_acceleration[at], block.mu_s, block.tan_theta, block.g
+        )
+
+
+@kernel
+def fill_history(
+    cell: physics.Cell, options: Options, wave: Wave, workspace: Workspace, phases: np.ndarray, found: History
+) -> None:
+    """Fill a history under a waveform at increasing phases."""
+    fill(cell, options, wave, workspace, False, phases, found)
+
+
+@kernel
+def fill_recorded_history(
+    cell: physics.Cell, options: Options, wave: Wave, workspace: Workspace, times: np.ndarray, found: History
+) -> None:
+    """Fill a history under a record at increasing times, at time scale 1; `cell.amplitude` is the factor on it."""
+    fill(cell, options, wave, workspace, True, times, found)

@@ -116,7 +116,7 @@ def continuous_pulse(
     return pulses.Pulse(after, displacement, velocity + most, 0.0, slips, 0)
 
 
-@inlined
+@single
 def recorded_pulse(
     block: Block, continuous: bool, options: Options, wave: Wave, k: int, following: int, peak: float,
     velocity: float, workspace: Workspace,

@@ -150,9 +150,9 @@ class _History:
 
     def sampled(self, phases: Floats) -> Floats:
         """The rows of `HISTORY` at phases, velocity and displacement in units of phase."""
-        table, is_record = np.empty((len(HISTORY), phases.size)), self.record is not None
-        shaking = self.wave, exact.workspace_of(self.wave, keeps_log=True), is_record
-        _interruptible(kernels.fill_history, self.cell, self.options, *shaking, phases, kernels.History(*table))
+        table, workspace = np.empty((len(HISTORY), phases.size)), exact.workspace_of(self.wave, keeps_log=True)
+        fill = kernels.fill_history if self.record is None else kernels.fill_recorded_history
+        _interruptible(fill, self.cell, self.options, self.wave, workspace, phases, kernels.History(*table))
         if self.valueless:  # from the beginning on, also where the flag is raised later
             table[1:] = math.nan
         return table

@@ -21,7 +21,7 @@ from slipsweep.grid.inputs import Problem
 from slipsweep.grid.solvers import options_of
 from slipsweep.kernels.block import Cell
 from slipsweep.kernels.exact import workspace_of
-from slipsweep.kernels.history import History, fill_history
+from slipsweep.kernels.history import History, fill_recorded_history
 from slipsweep.model.options import Cycle, Mendez
 from slipsweep.model.variables import HISTORY
 from slipsweep.motion.cutting import wave_of_record
@@ -164,7 +164,7 @@ class Observation:
             onset, decay, drop = map(float, parameters)
             cell = Cell(math.tan(math.radians(self.theta)), self.mu_s, 1.0, onset, decay, drop, math.nan)
             table = np.empty((len(HISTORY), times.size))
-            fill_history(cell, options, wave, workspace, True, times, History(*table))
+            fill_recorded_history(cell, options, wave, workspace, times, History(*table))
             return dict(zip(HISTORY, table, strict=True))
 
         return histories
