@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from mpmath import workdps
 
 from slipsweep import Record, sweep
+from tests.support.digits import workdps
 from tests.support.hard_records import CATEGORIES, Category, Cell, conditioning
 
 #: Of the conditioning bound, as for the hard cases of harmonic motion.

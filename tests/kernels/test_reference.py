@@ -4,11 +4,14 @@ import random
 from math import radians, tan
 from typing import Any
 
+import gmpy2
+import mpmath
 import pytest
-from mpmath import mp, mpf, workdps
+from gmpy2 import mpfr
 
 from tests.support import reference
 from tests.support.cases import read_cases
+from tests.support.digits import workdps
 from tests.support.sections import Waveform
 
 CASES = read_cases()
@@ -20,7 +23,7 @@ def test_motion_as_in_cases_csv(category: str) -> None:
     for case in (case for case in CASES if case.category == category):
         solution = reference.solve(**case.arguments | {"g": "9.81"})
         if case.uplift:
-            assert mp.isnan(solution.permanent_displacement)
+            assert gmpy2.is_nan(solution.permanent_displacement)
             assert (solution.sliding_mode, solution.validity) == (reference.MISSING, reference.UPLIFT)
             continue
         with workdps(40):
@@ -28,8 +31,8 @@ def test_motion_as_in_cases_csv(category: str) -> None:
                 (solution.permanent_displacement, case.permanent_displacement, case.displacement_scale),
                 (solution.peak_relative_velocity, case.peak_relative_velocity, case.velocity_scale),
             ):
-                exact = mpf(text)
-                assert abs(value - exact) <= mpf("1e-16") * abs(exact) + mpf("1e-28") * scale, f"case {case}"
+                exact = mpfr(text)
+                assert abs(value - exact) <= mpfr("1e-16") * abs(exact) + mpfr("1e-28") * scale, f"case {case}"
         codes = (solution.sliding_mode, solution.recoupled, solution.eq4_below_yield)
         assert codes == (case.sliding_mode, case.recoupled, case.eq4_below_yield), f"case {case}"
 
@@ -41,14 +44,14 @@ def test_continuous_velocity_is_that_of_bessel_and_struve_functions() -> None:
     one, two, three = (
         reference.solve(theta, mu_s, amplitude, 1, cycles=n, **options).permanent_displacement for n in (1, 2, 3)
     )
-    with workdps(40):
-        tan_theta = mp.tan(mp.radians(theta))
-        k = mpf(rate) * mpf(amplitude) / mpf("9.81")
-        decayed = 2 + mp.pi * (mp.struvel(1, k) - mp.besseli(1, k))
-        excess = mpf(mu_s) - tan_theta
-        gain = 2 * tan_theta * mpf(amplitude) * (2 * excess - (mpf(mu_s) + mpf(delta_mu)) * decayed)
-        expected = gain * 2 * mp.pi / (2 * mp.pi) ** 2
-        assert abs((three - two) - (two - one) - expected) < mpf("1e-27"), "velocity gained in a cycle"
+    with workdps(40), mpmath.workdps(40):
+        tan_theta = gmpy2.tan(gmpy2.radians(mpfr(theta)))
+        k = mpmath.mpf(rate) * mpmath.mpf(amplitude) / mpmath.mpf("9.81")
+        decayed = 2 + gmpy2.const_pi() * mpfr(str(mpmath.struvel(1, k) - mpmath.besseli(1, k)))
+        excess = mpfr(mu_s) - tan_theta
+        gain = 2 * tan_theta * mpfr(amplitude) * (2 * excess - (mpfr(mu_s) + mpfr(delta_mu)) * decayed)
+        expected = gain * 2 * gmpy2.const_pi() / (2 * gmpy2.const_pi()) ** 2
+        assert abs((three - two) - (two - one) - expected) < mpfr("1e-27"), "velocity gained in a cycle"
 
 
 def test_cycles_passed_over_are_those_gone_through(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -74,7 +77,7 @@ def test_cycles_passed_over_are_those_gone_through(monkeypatch: pytest.MonkeyPat
             continue
         carried += not one.recoupled
         for name in ("permanent_displacement", "peak_relative_velocity"):
-            assert abs(getattr(one, name) - getattr(other, name)) < mpf("1e-27"), f"{name}: {theta}, {mu_s}, {options}"
+            assert abs(getattr(one, name) - getattr(other, name)) < mpfr("1e-27"), f"{name}: {theta}, {mu_s}, {options}"
         assert one.validity == other.validity
 
 

@@ -4,14 +4,16 @@ import itertools
 from dataclasses import replace
 from math import pi
 
+import gmpy2
 import numpy as np
 import pytest
-from mpmath import mp, mpf, workdps
+from gmpy2 import mpfr
 
 from slipsweep import Cosine, Cycle, Harmonics, Sine, Square, Step, Triangle, sweep
 from slipsweep.motion.cutting import wave_of
 from slipsweep.motion.waveforms import Waveform
 from tests.support import sections
+from tests.support.digits import workdps
 
 CYCLES = 4
 RICH = Harmonics([1.0, 0.6, 0.35, 0.2], [1, 2, 5, 50], [0.0, 40.0, 100.0, 7.0], cycles=CYCLES)
@@ -38,9 +40,9 @@ def exact(waveform: Waveform, phase: np.ndarray) -> np.ndarray:
     reference = sections.Waveform(waveform.name, terms, waveform.cycles, waveform.ramp_in, waveform.ramp_out)
     with workdps(30):
         numbers, values = (phase // (2 * pi)).astype(int).tolist(), []
-        cycles = {n: list(reference.sections(n, mpf(1))) for n in {*numbers}}
+        cycles = {n: list(reference.sections(n, mpfr(1))) for n in {*numbers}}
         for n, phi in zip(numbers, phase.tolist(), strict=True):
-            own = phi - 2 * mp.pi * n
+            own = phi - 2 * gmpy2.const_pi() * n
             values.append(float(next(one for one in cycles[n] if own <= one.end).ground(own)))
     return np.array(values)
 

@@ -50,6 +50,27 @@ def test_a_long_slide_has_a_bounded_number_of_points(shaken: str, yield_accelera
             assert time[-1] - time[16 * cycles] == pytest.approx(speed / yield_acceleration, rel=1e-9)
 
 
+def test_a_finely_sampled_sine_in_continuous_sliding() -> None:
+    """A record ends with the plane at rest: what velocity is left when the sine ends is braked by Eq. 12."""
+    block: dict[str, Any] = {"theta": 6.0, "mu_s": 0.38, "yield_acceleration": 0.08}
+    sine = simulate(**block, amplitude=6.5, frequency=2.0, excitation=Sine(cycles=3), times=[1.5])
+    assert sine.sliding_mode == 2
+    friction = slipsweep.friction_parameters(**block, amplitude=6.5).minimum_friction.item()
+    t_theta = np.tan(np.radians(6.0))
+    held = 6.5 - (9.81 + 6.5 * t_theta) * (0.38 - t_theta - friction) - 9.81 * t_theta  # Eq. 4 at the peak
+    left = sine.relative_velocity.item()
+    u = sine.permanent_displacement.item() + left * abs(left) / (2 * held)
+    errors = []
+    for samples in (250, 4000):
+        times = np.arange(3 * samples + 1) / (2.0 * samples)
+        found = sweep(**block, excitation=Record(times, 6.5 * np.sin(4 * np.pi * times)))
+        assert (found.number_of_slips, found.stick_slip_pulses, found.continuous_pulses) == (1, 0, 3)
+        errors.append(abs(found.permanent_displacement.item() / u - 1))
+        peak = sine.peak_relative_velocity.item()
+        assert found.peak_relative_velocity.item() == pytest.approx(peak, rel=10 / samples**2)
+    assert errors[1] < errors[0] / 150
+
+
 @pytest.mark.parametrize("solver", ["cycle", slipsweep.Step("simpson", 4096)], ids=["cycle", "step"])
 @pytest.mark.parametrize(
     "excitation",

@@ -3,15 +3,17 @@
 from itertools import pairwise
 from typing import Any
 
-from mpmath import mp, mpf
+import gmpy2
+from gmpy2 import mpfr
 
+from tests.support.digits import decimals
 from tests.support.sections import Function, Section, root
 
 
 class Interface:
     """Friction at the interface and the block's acceleration that follows (Eqs. 2-6)."""
 
-    def __init__(self, g: mpf, tan_theta: mpf, mu_s: mpf, delta_mu: mpf, decay_rate: mpf, onset: mpf) -> None:
+    def __init__(self, g: mpfr, tan_theta: mpfr, mu_s: mpfr, delta_mu: mpfr, decay_rate: mpfr, onset: mpfr) -> None:
         self.g = g
         self.tan_theta = tan_theta
         self.excess = mu_s - tan_theta
@@ -19,21 +21,21 @@ class Interface:
         self.decay = decay_rate / g
         self.yield_acceleration = onset
 
-    def relative_acceleration(self, ground: mpf, side: int = 1) -> mpf:
+    def relative_acceleration(self, ground: mpfr, side: int = 1) -> mpfr:
         """Üg − Ü with Ü by Eq. 4; at Üg = 0 as it is on this side of it."""
-        friction = self.friction_at_rest * mp.exp(-self.decay * abs(ground))
+        friction = self.friction_at_rest * gmpy2.exp(-self.decay * abs(ground))
         return side * ((self.g + ground * self.tan_theta) * (self.excess - friction) + self.g * self.tan_theta)
 
-    def slope(self, ground: mpf, side: int = 1) -> mpf:
+    def slope(self, ground: mpfr, side: int = 1) -> mpfr:
         """Derivative of `relative_acceleration`."""
-        friction = self.friction_at_rest * mp.exp(-self.decay * abs(ground))
+        friction = self.friction_at_rest * gmpy2.exp(-self.decay * abs(ground))
         normal = self.g + ground * self.tan_theta
         return side * self.tan_theta * (self.excess - friction) + normal * self.decay * friction
 
-    def eq4(self, ground: mpf) -> mpf:
+    def eq4(self, ground: mpfr) -> mpfr:
         return ground - self.relative_acceleration(ground)
 
-    def monotone_pieces(self, slope: Function, low: mpf, high: mpf) -> list[mpf]:
+    def monotone_pieces(self, slope: Function, low: mpfr, high: mpfr) -> list[mpfr]:
         """Ends of the pieces of [low, high], on one side of zero, on which a function of Eq. 4 is monotone.
 
         The slope of Eq. 4 is itself monotone on either side of one inflection, where n lambda / g = 2 tan(theta).
@@ -45,15 +47,15 @@ class Interface:
                 cuts.insert(1, inflection)
         ends = [low]
         for a, b in pairwise(cuts):
-            if mp.sign(slope(a)) * mp.sign(slope(b)) < 0:
+            if gmpy2.sign(slope(a)) * gmpy2.sign(slope(b)) < 0:
                 ends.append(root(slope, a, b))
             ends.append(b)
         return ends
 
-    def sign_changes(self, low: mpf, high: mpf, side: int = 1) -> list[mpf]:
+    def sign_changes(self, low: mpfr, high: mpfr, side: int = 1) -> list[mpfr]:
         """The zeros of the relative acceleration between `low` and `high`, on one side of zero."""
 
-        def value(ground: mpf) -> mpf:
+        def value(ground: mpfr) -> mpfr:
             return self.relative_acceleration(ground, side)
 
         ends = self.monotone_pieces(lambda ground: self.slope(ground, side), low, high) if low < high else []
@@ -73,46 +75,46 @@ class Block:
         self.newmark = model == "newmark"
         self.literal = rise == "literal" and not self.newmark
         self.integrate = recoupling == "integrate" or self.newmark
-        self.v = self.u = self.peak = self.lowest = self.b = mpf(0)
-        self.ground = mpf(0)  # Üg at the end of the section before
+        self.v = self.u = self.peak = self.lowest = self.b = mpfr(0)
+        self.ground = mpfr(0)  # Üg at the end of the section before
         self.sliding = self.recoupled_late = False
         self.reset = True  # the next Üg = Üy on a rise resets b
         self.slips = 0
 
     def state(self) -> tuple[Any, ...]:
         """What the motion that follows depends on, but for u."""
-        return self.v, self.b if self.v else mpf(0), self.ground, self.sliding, self.reset
+        return self.v, self.b if self.v else mpfr(0), self.ground, self.sliding, self.reset
 
     def same(self, one: tuple[Any, ...], other: tuple[Any, ...]) -> bool:
         return all(abs(a - b) <= self.rounding for a, b in zip(one, other, strict=True))
 
-    def meet_interface(self, interface: Interface, amplitude: mpf, digits: int) -> None:
+    def meet_interface(self, interface: Interface, amplitude: mpfr, digits: int) -> None:
         self.interface, self.onset = interface, interface.yield_acceleration
-        self.rounding = amplitude * mpf(10) ** -digits
+        self.rounding = amplitude * mpfr(10) ** -digits
 
     # ------------------------------------------------------------------ motion with a given b
 
-    def go(self, section: Section, start: mpf, end: mpf, held: mpf | None) -> mpf:
+    def go(self, section: Section, start: mpfr, end: mpfr, held: mpfr | None) -> mpfr:
         """Slide with b held, or by Eq. 4 (None), where Üg − b is of one sign; where the block stops, or end."""
-        decay = self.interface.decay if held is None else mpf(0)
+        decay = self.interface.decay if held is None else mpfr(0)
 
-        def rate(x: mpf) -> mpf:
+        def rate(x: mpfr) -> mpfr:
             return self.interface.relative_acceleration(x) if held is None else x - held
 
         gained, moved = section.integrals(rate, start, end, decay)
         if self.v + gained >= -self.rounding:
             self.u += self.v * (end - start) + moved
-            self.change_speed(max(self.v + gained, mpf(0)))
+            self.change_speed(max(self.v + gained, mpfr(0)))
             return end
         stop = self.stop(section, start, end, rate, decay) if self.v > self.rounding else start
         self.u += self.v * (stop - start) + section.integrals(rate, start, stop, decay)[1]
-        self.change_speed(mpf(0))
+        self.change_speed(mpfr(0))
         self.sliding = False
         return stop
 
-    def stop(self, section: Section, low: mpf, high: mpf, rate: Function, decay: mpf) -> mpf:
+    def stop(self, section: Section, low: mpfr, high: mpfr, rate: Function, decay: mpfr) -> mpfr:
         """Where the velocity, which falls from low to high, is zero (Newton kept in its bracket)."""
-        phi, velocity, tiny = low, self.v, (high - low) * mpf(10) ** (10 - mp.dps)
+        phi, velocity, tiny = low, self.v, (high - low) * mpfr(10) ** (10 - decimals())
         while high - low > tiny:
             slope = rate(section.ground(phi))
             new = phi - velocity / slope if slope < 0 else high
@@ -126,11 +128,11 @@ class Block:
             low, high = (phi, high) if velocity > 0 else (low, phi)
         return phi
 
-    def change_speed(self, velocity: mpf) -> None:
+    def change_speed(self, velocity: mpfr) -> None:
         self.v = velocity
         self.peak, self.lowest = max(self.peak, velocity), min(self.lowest, velocity)
 
-    def hold(self, section: Section, start: mpf, end: mpf) -> mpf:
+    def hold(self, section: Section, start: mpfr, end: mpfr) -> mpfr:
         """Slide with b held; where the block stops, or end."""
         cuts = [start, end]
         if (section.ground(start) - self.b) * (section.ground(end) - self.b) < 0:
@@ -141,10 +143,10 @@ class Block:
                 return at
         return end
 
-    def brake(self, span: mpf) -> None:
+    def brake(self, span: mpfr) -> None:
         """Eq. 12 until the velocity, of either sign, is zero."""
         time = min(abs(self.v) / self.b, span)
-        slower = self.v - mp.sign(self.v) * self.b * time if time < abs(self.v) / self.b else mpf(0)
+        slower = self.v - gmpy2.sign(self.v) * self.b * time if time < abs(self.v) / self.b else mpfr(0)
         self.u += (self.v + slower) * time / 2
         self.change_speed(slower)
         self.sliding = slower != 0
@@ -153,7 +155,7 @@ class Block:
         """Continuous sliding: Eq. 4, the velocity of either sign."""
         side, (low, high) = section.side, sorted((section.first, section.last))
 
-        def rate(x: mpf) -> mpf:
+        def rate(x: mpfr) -> mpfr:
             return self.interface.relative_acceleration(x, side)
 
         turns = sorted(section.phase(x) for x in self.interface.sign_changes(low, high, side))
@@ -164,7 +166,7 @@ class Block:
 
     # -------------------------------------------------------------------- stick, slide, attenuate
 
-    def starting(self, x: mpf) -> mpf:
+    def starting(self, x: mpfr) -> mpfr:
         """c(Üg): the block acceleration with which a slide begins."""
         if self.newmark:
             return self.onset
@@ -192,7 +194,7 @@ class Block:
             raise NoValueError
 
     def rise(self, section: Section) -> None:
-        interface, low, high = self.interface, max(section.first, mpf(0)), section.last
+        interface, low, high = self.interface, max(section.first, mpfr(0)), section.last
         levels = [self.onset]
         if not self.newmark and low < high:
             levels += interface.sign_changes(low, high)
@@ -205,7 +207,7 @@ class Block:
                 if not self.sliding and a < b:
                     self.begin(section.ground(a), section.ground((a + b) / 2))
 
-    def meet(self, x: mpf, beyond: mpf) -> None:
+    def meet(self, x: mpfr, beyond: mpfr) -> None:
         """What happens as the base comes to x, not falling, on its way to `beyond`."""
         if self.reset and beyond > self.onset:
             self.recoupled_late |= self.v > 0
@@ -216,22 +218,22 @@ class Block:
         elif self.sliding and not self.reset and not self.newmark:
             self.b = self.interface.eq4(x) if self.literal else max(self.b, self.interface.eq4(x))
 
-    def begin(self, x: mpf, beyond: mpf) -> None:
+    def begin(self, x: mpfr, beyond: mpfr) -> None:
         """Begin to slide, if the block at rest does between x and beyond."""
         if beyond > self.onset and (self.newmark or self.interface.relative_acceleration(beyond) > 0):
             self.sliding, self.b = True, self.starting(x)
             self.slips += 1
 
-    def slide(self, section: Section, a: mpf, b: mpf) -> mpf:
+    def slide(self, section: Section, a: mpfr, b: mpfr) -> mpfr:
         """Slide over a part of a rise on which Eq. 4 and Üg − Ü are monotone; where it ends."""
         if self.reset and not self.integrate:
             self.brake(b - a)
             return b
-        at_end = self.interface.eq4(section.ground(b)) if not self.newmark else mpf(0)
+        at_end = self.interface.eq4(section.ground(b)) if not self.newmark else mpfr(0)
         if self.reset or self.newmark or (not self.literal and at_end <= self.b):
             return self.hold(section, a, b)
         switch, level = a, self.b
-        if not self.literal and self.interface.eq4(section.ground(a)) < level - self.onset * mpf(10) ** -28:
+        if not self.literal and self.interface.eq4(section.ground(a)) < level - self.onset * mpfr(10) ** -28:
             switch = root(lambda phi: self.interface.eq4(section.ground(phi)) - level, a, b)
             at = self.hold(section, a, switch)
             if not self.sliding:
@@ -244,4 +246,4 @@ class Block:
         """Eq. 12 after the shaking."""
         if self.sliding:
             self.check()
-            self.brake(mp.inf)
+            self.brake(gmpy2.inf())

@@ -19,7 +19,7 @@ from slipsweep.motion.waveforms import WAVEFORMS
 DATA = Path(__file__).parents[1] / "data"
 OPTIONAL_INPUTS = ("yield_acceleration", "decay_rate", "delta_mu")
 PARAMETERS = ("theta", "mu_s", "amplitude", "frequency")
-OPTIONS = ("model", "rise", "recoupling", "cycles", "g", "waveform", "harmonics", "ramp_in", "ramp_out")
+OPTIONS = ("waveform", "harmonics", "ramp_in", "ramp_out", "cycles", "model", "rise", "recoupling", "g")
 
 #: Displacement, peak velocity, mode and validity.
 Found = tuple[float, float, int, int]

@@ -8,11 +8,13 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TypeAlias
 
+import gmpy2
 import numpy as np
-from mpmath import mp, mpf, nstr, workdps
+from gmpy2 import mpfr
 
 from tests.support import reference
 from tests.support.cases import read_cases
+from tests.support.digits import shown, workdps
 
 G = 9.81
 
@@ -47,7 +49,7 @@ def just_above_yield() -> Iterator[Cell]:
     for theta, mu_s in PLANES:
         onset = _friction(theta, mu_s).yield_acceleration
         for k in (2, 5, 8, 11, 14):
-            yield _cell(theta, mu_s, onset * (1 + mpf(10) ** -k))
+            yield _cell(theta, mu_s, onset * (1 + mpfr(10) ** -k))
     for k in (4, 12):
         yield _cell(5.0, 0.38, 0.59 * (1 + 10.0**-k), yield_acceleration=0.59)
     yield _cell(5.0, 0.38, 0.59, yield_acceleration=0.59)
@@ -67,13 +69,13 @@ def near_failure() -> Iterator[Cell]:
     """μs within 10⁻ᵏ of tan θ: Üy is all cancellation, Kd small."""
     for theta in (5.0, 18.0):
         with workdps(40):
-            tangent = mp.tan(mp.radians(mpf(theta)))
+            tangent = gmpy2.tan(gmpy2.radians(mpfr(theta)))
         for k in (3, 6, 9, 12, 15):
-            mu_s = float(tangent * (1 + mpf(10) ** -k))
+            mu_s = float(tangent * (1 + mpfr(10) ** -k))
             for amplitude in (3 * _friction(theta, mu_s).yield_acceleration, 1.0):
                 yield _cell(theta, mu_s, amplitude, cycles=2)
-        yield _cell(theta, float(tangent * (1 + mpf(10) ** -9)), 1.0, cycles=2, recoupling="integrate")
-        yield _cell(theta, float(tangent * (1 + mpf(10) ** -9)), 1.0, cycles=2, model="newmark")
+        yield _cell(theta, float(tangent * (1 + mpfr(10) ** -9)), 1.0, cycles=2, recoupling="integrate")
+        yield _cell(theta, float(tangent * (1 + mpfr(10) ** -9)), 1.0, cycles=2, model="newmark")
 
 
 def level_plane() -> Iterator[Cell]:
@@ -91,19 +93,19 @@ def uplift() -> Iterator[Cell]:
     """A tan θ → g: the normal force vanishes in the cycle."""
     for theta, mu_s in ((20.0, 0.6), (30.0, 0.9)):
         with workdps(40):
-            uplift = mpf(G) / mp.tan(mp.radians(mpf(theta)))
+            uplift = mpfr(G) / gmpy2.tan(gmpy2.radians(mpfr(theta)))
         for k in (2, 5, 8, 11, 14):
-            yield _cell(theta, mu_s, uplift * (1 - mpf(10) ** -k), cycles=2)
+            yield _cell(theta, mu_s, uplift * (1 - mpfr(10) ** -k), cycles=2)
 
 
 def limit_undefined() -> Iterator[Cell]:
     """1 − tan θ (μs − tan θ) → 0: Üg,lim and Δμ grow without bound."""
     for theta in (45.0, 60.0):
         with workdps(40):
-            tangent = mp.tan(mp.radians(mpf(theta)))
+            tangent = gmpy2.tan(gmpy2.radians(mpfr(theta)))
             highest = tangent + 1 / tangent  # μs of a zero denominator
         for k in (2, 5, 8, 11, 14):
-            mu_s = float(highest * (1 - mpf(10) ** -k))
+            mu_s = float(highest * (1 - mpfr(10) ** -k))
             onset = float(_friction(theta, mu_s).yield_acceleration)
             uplift = float(G / tangent)
             yield _cell(theta, mu_s, onset + 0.8 * (uplift - onset) if onset < uplift else 0.9 * uplift, cycles=2)
@@ -115,21 +117,21 @@ def friction_not_decaying() -> Iterator[Cell]:
     for theta, mu_s in ((5.0, 1.2), (0.0, 1.5)):
         limit = _friction(theta, mu_s).limiting_acceleration
         for k in (2, 5, 8, 11, 14):
-            short = (1 - mpf(10) ** -k) / mp.sqrt(mpf(mu_s))
+            short = (1 - mpfr(10) ** -k) / gmpy2.sqrt(mpfr(mu_s))
             yield _cell(theta, mu_s, limit * short, cycles=2)
             given = _friction(theta, mu_s, yield_acceleration=2.0).limiting_acceleration
             yield _cell(theta, mu_s, given * short, cycles=2, yield_acceleration=2.0)
     # beyond μs ξ² = 1 there is no value, but of Newmark's block, which slides
     limit = _friction(0.0, 1.5, yield_acceleration=2.0).limiting_acceleration
     for k in (2, 8, 14):
-        amplitude = limit * (1 + mpf(10) ** -k) / mp.sqrt(mpf(1.5))
+        amplitude = limit * (1 + mpfr(10) ** -k) / gmpy2.sqrt(mpfr(1.5))
         yield _cell(0.0, 1.5, amplitude, cycles=2, yield_acceleration=2.0)
         yield _cell(0.0, 1.5, amplitude, cycles=2, yield_acceleration=2.0, model="newmark")
     # with the default Δμ Eq. 4 holds these blocks back; without it the friction starts from μs, and on a level plane
     # they slide as soon as it decays at all, which it does up to μs ξ = 1
     for k in (2, 5, 8, 11, 14):
         for side in (-1, 1):
-            amplitude = limit * (1 + side * mpf(10) ** -k) / mpf(1.5)
+            amplitude = limit * (1 + side * mpfr(10) ** -k) / mpfr(1.5)
             yield _cell(0.0, 1.5, amplitude, cycles=2, yield_acceleration=2.0, delta_mu=0.0)
 
 
@@ -151,22 +153,22 @@ def tangential_onset() -> Iterator[Cell]:
     theta, mu_s, onset, amplitude = 20.0, 0.2, 1.3 * G, 1.4 * G
     given = {"yield_acceleration": onset}
     with workdps(60):
-        tangent, g = mp.tan(mp.radians(mpf(theta))), mpf(G)
-        excess, touching = mu_s - tangent, mpf("1.5")  # n/g at the maximum
+        tangent, g = gmpy2.tan(gmpy2.radians(mpfr(theta))), mpfr(G)
+        excess, touching = mu_s - tangent, mpfr("1.5")  # n/g at the maximum
         rate = tangent**2 / (touching * (touching * excess + tangent))
         given["decay_rate"] = float(rate)
         x = (touching - 1) * g / tangent
-        level = mp.exp(float(rate) * x / g) * (excess + tangent / touching) - mu_s
+        level = gmpy2.exp(float(rate) * x / g) * (excess + tangent / touching) - mu_s
         for k in (2, 4, 6, 8, 10, 12):
-            yield _cell(theta, mu_s, amplitude, **given, delta_mu=float(level * (1 - mpf(10) ** -k)))
-        yield _cell(theta, mu_s, amplitude, **given, delta_mu=float(level * (1 + mpf(10) ** -12)))
+            yield _cell(theta, mu_s, amplitude, **given, delta_mu=float(level * (1 - mpfr(10) ** -k)))
+        yield _cell(theta, mu_s, amplitude, **given, delta_mu=float(level * (1 + mpfr(10) ** -12)))
         # or Eq. 4 falls to Üg at the very peak
-        theta, mu_s, amplitude, rate = 5.0, 0.38, 3.0, mpf(4)
-        tangent = mp.tan(mp.radians(mpf(theta)))
+        theta, mu_s, amplitude, rate = 5.0, 0.38, 3.0, mpfr(4)
+        tangent = gmpy2.tan(gmpy2.radians(mpfr(theta)))
         n = g + amplitude * tangent
-        level = mp.exp(rate * amplitude / g) * (mu_s - tangent + g * tangent / n) - mu_s
+        level = gmpy2.exp(rate * amplitude / g) * (mu_s - tangent + g * tangent / n) - mu_s
         for k in (2, 5, 8, 11, 14):
-            friction = {"decay_rate": 4.0, "delta_mu": float(level * (1 - mpf(10) ** -k))}
+            friction = {"decay_rate": 4.0, "delta_mu": float(level * (1 - mpfr(10) ** -k))}
             yield _cell(theta, mu_s, amplitude, yield_acceleration=0.59, **friction)
 
 
@@ -200,11 +202,11 @@ def vanishing_kd() -> Iterator[Cell]:
     """Kd → 0 under the literal rise: u = v²/(2b) grows without bound."""
     theta, mu_s, amplitude, rate = 5.0, 0.38, 1.5, 4.0
     with workdps(60):
-        tangent, g = mp.tan(mp.radians(mpf(theta))), mpf(G)
+        tangent, g = gmpy2.tan(gmpy2.radians(mpfr(theta))), mpfr(G)
         n = g + amplitude * tangent
         for k in (1, 3, 6, 9, 12):
-            friction = mu_s - tangent - (amplitude * (1 - mpf(10) ** -k) - g * tangent) / n
-            given = {"decay_rate": rate, "delta_mu": float(friction * mp.exp(rate * amplitude / g) - mu_s)}
+            friction = mu_s - tangent - (amplitude * (1 - mpfr(10) ** -k) - g * tangent) / n
+            given = {"decay_rate": rate, "delta_mu": float(friction * gmpy2.exp(rate * amplitude / g) - mu_s)}
             yield _cell(theta, mu_s, amplitude, yield_acceleration=0.59, rise="literal", **given)
 
 
@@ -276,10 +278,10 @@ def neighbours(cell: Cell) -> Iterator[Cell]:
                     yield {**cell, name: moved}
 
 
-def bound_of(value: mpf, others: Iterable[mpf], dtype: str = "float64") -> mpf:
+def bound_of(value: mpfr, others: Iterable[mpfr], dtype: str = "float64") -> mpfr:
     """How far a result is from those of its neighbours that have one, plus half an ulp of its own."""
-    moves = [abs(other - value) for other in others if not mp.isnan(other)]
-    return max(moves, default=mpf(0)) + mpf(float(np.spacing(np.dtype(dtype).type(abs(value))))) / 2
+    moves = [abs(other - value) for other in others if not gmpy2.is_nan(other)]
+    return max(moves, default=mpfr(0)) + mpfr(float(np.spacing(np.dtype(dtype).type(abs(value))))) / 2
 
 
 def conditioning(cell: Cell, dtype: str = "float64") -> dict[str, str]:
@@ -293,9 +295,9 @@ def conditioning(cell: Cell, dtype: str = "float64") -> dict[str, str]:
             ("peak_relative_velocity", "velocity_bound"),
         ):
             value = getattr(answer, result)
-            has_none = mp.isnan(value)
-            found[result] = "" if has_none else nstr(value, 30)
+            has_none = gmpy2.is_nan(value)
+            found[result] = "" if has_none else shown(value, 30)
             moved = bound_of(value, (getattr(other, result) for other in others), dtype)
-            found[bound] = "" if has_none else nstr(moved, 6)
+            found[bound] = "" if has_none else shown(moved, 6)
     outcomes = sorted({(other.sliding_mode, other.validity) for other in [answer, *others]})
     return {**found, "outcomes": " ".join(f"{mode}:{validity}" for mode, validity in outcomes)}

@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
-from mpmath import mpf, workdps
+from gmpy2 import mpfr
 from numpy.typing import NDArray
 
+from tests.support.digits import workdps
 from tests.support.hard_cells import bound_of
 from tests.support.reference import RecordSolution, solve_record
 
@@ -38,7 +39,7 @@ def solve(cell: Cell) -> RecordSolution:
     times = cell.times
     with workdps(60):
         if times is None:
-            times = [mpf(cell.interval) * i for i in range(cell.samples.size)]
+            times = [mpfr(cell.interval) * i for i in range(cell.samples.size)]
         return solve_record(
             times, cell.samples, 0.0, 0.5, scale=cell.scale, model="newmark", yield_acceleration=cell.onset, dps=30
         )
@@ -57,7 +58,7 @@ def neighbours(cell: Cell) -> Iterator[Cell]:
             yield replace(cell, times=np.nextafter(cell.times, turns))
 
 
-def conditioning(cell: Cell) -> tuple[RecordSolution, mpf, mpf]:
+def conditioning(cell: Cell) -> tuple[RecordSolution, mpfr, mpfr]:
     """The exact response, and how far displacement and peak velocity move: plus half an ulp of their own."""
     own, others = solve(cell), [solve(other) for other in neighbours(cell)]
     with workdps(60):

@@ -10,12 +10,14 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
-from mpmath import mp, mpf, workdps
+import gmpy2
+from gmpy2 import mpfr
 
 from tests.support.block import Block, Interface, NoValueError
+from tests.support.digits import workdps
 from tests.support.sections import Section, Waveform, sections_of_record
 
-Number: TypeAlias = float | int | str | mpf
+Number: TypeAlias = float | int | str | mpfr
 
 MISSING, STUCK, STICK_SLIP, CONTINUOUS = -1, 0, 1, 2
 
@@ -40,16 +42,16 @@ GUARD_DIGITS = 30
 class FrictionParameters:
     """Eqs. 7-11 of one cell; NaN where a formula has no value."""
 
-    yield_acceleration: mpf
-    limiting_acceleration: mpf
-    acceleration_ratio: mpf
-    minimum_friction: mpf
-    delta_mu: mpf
-    decay_rate: mpf
+    yield_acceleration: mpfr
+    limiting_acceleration: mpfr
+    acceleration_ratio: mpfr
+    minimum_friction: mpfr
+    delta_mu: mpfr
+    decay_rate: mpfr
     sliding_mode: int
     validity: int
 
-    def interface(self, g: mpf, tan_theta: mpf, mu_s: mpf) -> Interface:
+    def interface(self, g: mpfr, tan_theta: mpfr, mu_s: mpfr) -> Interface:
         return Interface(g, tan_theta, mu_s, self.delta_mu, self.decay_rate, self.yield_acceleration)
 
 
@@ -62,8 +64,8 @@ class Solution:
     but for Newmark's block, where it is true and the bit is not set.
     """
 
-    permanent_displacement: mpf
-    peak_relative_velocity: mpf
+    permanent_displacement: mpfr
+    peak_relative_velocity: mpfr
     sliding_mode: int
     validity: int
     recoupled: bool = False
@@ -74,8 +76,8 @@ class Solution:
 class RecordSolution:
     """Response to a record; the counts are -1 where there is no value."""
 
-    permanent_displacement: mpf
-    peak_relative_velocity: mpf
+    permanent_displacement: mpfr
+    peak_relative_velocity: mpfr
     number_of_slips: int
     stick_slip_pulses: int
     continuous_pulses: int
@@ -97,32 +99,32 @@ def friction_parameters(
 ) -> FrictionParameters:
     """Friction parameters of one cell (Eqs. 7-11), `theta` in degrees, the rest in SI units."""
     with workdps(dps + GUARD_DIGITS):
-        tan_theta, static, peak, gravity = mp.tan(mp.radians(mpf(theta))), mpf(mu_s), mpf(amplitude), mpf(g)
+        tan_theta, static, peak, gravity = gmpy2.tan(gmpy2.radians(mpfr(theta))), mpfr(mu_s), mpfr(amplitude), mpfr(g)
         onset = gravity * (static - tan_theta) / (1 + static * tan_theta)
-        onset = onset if yield_acceleration is None else mpf(yield_acceleration)
+        onset = onset if yield_acceleration is None else mpfr(yield_acceleration)
         validity = STATICALLY_UNSTABLE * (onset <= 0)
         denominator = 1 - tan_theta * (static - tan_theta)
-        limit = (onset + gravity * static) / denominator if denominator > 0 else mp.nan
+        limit = (onset + gravity * static) / denominator if denominator > 0 else gmpy2.nan()
         ratio = peak / limit
         continuous = ratio > 1
-        least = mpf("0.01") if continuous else static**2 * ratio
-        least = least if minimum_friction is None else mpf(minimum_friction)
-        inverse = 1 / ratio if ratio != 0 else mp.inf
-        excess = static * ((ratio if continuous else inverse) - 1) if delta_mu is None else mpf(delta_mu)
-        decays = (static + excess) / least if least != 0 else mp.inf
+        least = mpfr("0.01") if continuous else static**2 * ratio
+        least = least if minimum_friction is None else mpfr(minimum_friction)
+        inverse = 1 / ratio if ratio != 0 else gmpy2.inf()
+        excess = static * ((ratio if continuous else inverse) - 1) if delta_mu is None else mpfr(delta_mu)
+        decays = (static + excess) / least if least != 0 else gmpy2.inf()
         if model != "newmark":
             validity |= UPLIFT * (peak * tan_theta >= gravity) | LIMIT_UNDEFINED * (denominator <= 0)
             if decay_rate is None and not validity & (STATICALLY_UNSTABLE | LIMIT_UNDEFINED):
                 validity |= FRICTION_NOT_DECAYING * (decays <= 1)
-        rate = mp.nan if decay_rate is None else mpf(decay_rate)
+        rate = gmpy2.nan() if decay_rate is None else mpfr(decay_rate)
         if decay_rate is None and peak > 0 and decays > 0:  # false for NaN
-            rate = gravity / peak * mp.log(decays)
+            rate = gravity / peak * gmpy2.log(decays)
         mode = CONTINUOUS if continuous and model != "newmark" else STICK_SLIP
         mode = MISSING if validity else STUCK if peak <= onset else mode
         return FrictionParameters(onset, limit, ratio, least, excess, rate, mode, validity)
 
 
-def _remarks(ratio: mpf, upslope: bool, below: bool, model: str, given: dict[str, Any]) -> int:
+def _remarks(ratio: mpfr, upslope: bool, below: bool, model: str, given: dict[str, Any]) -> int:
     """Bits of a block that slides and has a value: upslope, near the mode limit, friction estimated."""
     if model == "newmark":
         return UPSLOPE * upslope
@@ -131,7 +133,7 @@ def _remarks(ratio: mpf, upslope: bool, below: bool, model: str, given: dict[str
     return UPSLOPE * upslope | NEAR_MODE_LIMIT * near | FRICTION_ESTIMATED * (estimated and not below)
 
 
-def _yield_governs(block: Block, rises: Iterable[tuple[mpf, mpf]]) -> bool:
+def _yield_governs(block: Block, rises: Iterable[tuple[mpfr, mpfr]]) -> bool:
     """Whether Üg exceeds Uy, and Eq. 4 stays below it at all that the base rises through."""
     interface = block.interface
     values = [
@@ -140,13 +142,13 @@ def _yield_governs(block: Block, rises: Iterable[tuple[mpf, mpf]]) -> bool:
         if high > block.onset
         for x in interface.monotone_pieces(lambda x: 1 - interface.slope(x), max(low, block.onset), high)
     ]
-    limit = block.onset * (1 + mpf(10) ** -25)
+    limit = block.onset * (1 + mpfr(10) ** -25)
     return bool(values) and (block.newmark or all(interface.eq4(x) <= limit for x in values))
 
 
-def _rises(shaking: Iterable[Section], rounding: mpf) -> Iterator[tuple[mpf, mpf]]:
+def _rises(shaking: Iterable[Section], rounding: mpfr) -> Iterator[tuple[mpfr, mpfr]]:
     """From where to where the base's acceleration rises, or jumps up."""
-    before = mpf(0)
+    before = mpfr(0)
     for section in shaking:
         if section.last > section.first:
             yield section.first, section.last
@@ -155,11 +157,11 @@ def _rises(shaking: Iterable[Section], rounding: mpf) -> Iterator[tuple[mpf, mpf
         before = section.last
 
 
-def _cycles(block: Block, wave: Waveform, amplitude: mpf, is_continuous: bool) -> list[Section]:
+def _cycles(block: Block, wave: Waveform, amplitude: mpfr, is_continuous: bool) -> list[Section]:
     """The motion through all cycles, those alike passed over; the sections of the cycles that differ."""
     shaking: list[Section] = []
-    seen: list[tuple[tuple[Any, ...], int, mpf]] = []
-    n, highest = 0, mpf(0)
+    seen: list[tuple[tuple[Any, ...], int, mpfr]] = []
+    n, highest = 0, mpfr(0)
     while n < wave.cycles:
         sections = list(wave.sections(n, amplitude))
         alike = wave.alike(n) - 1
@@ -181,8 +183,8 @@ def _cycles(block: Block, wave: Waveform, amplitude: mpf, is_continuous: bool) -
             if block.same(before[1:], block.state()[1:]) and (is_continuous or block.lowest > 0):
                 # the next ones differ by a velocity that is added
                 if gain < 0 and not is_continuous:
-                    alike = min(alike, max(0, int(mp.floor(-block.lowest / gain)) - 1))
-                block.u += alike * (block.u - u) + 2 * mp.pi * gain * alike * (alike + 1) / 2
+                    alike = min(alike, max(0, int(gmpy2.floor(-block.lowest / gain)) - 1))
+                block.u += alike * (block.u - u) + 2 * gmpy2.const_pi() * gain * alike * (alike + 1) / 2
                 block.peak += max(gain, 0) * alike
                 block.v += gain * alike
                 n += alike
@@ -238,16 +240,16 @@ recoupling, g
     """
     with workdps(dps + GUARD_DIGITS):
         parameters = friction_parameters(theta, mu_s, amplitude, model=model, g=g, dps=dps, **given)
-        validity, mode, peak = parameters.validity, parameters.sliding_mode, mpf(amplitude)
+        validity, mode, peak = parameters.validity, parameters.sliding_mode, mpfr(amplitude)
         if structure_frequency is not None:
             in_band = 0.2 <= float(frequency) / float(structure_frequency) <= 1.3  # in doubles: 1/5 is 0.2
             validity |= FLEXIBLE_BLOCK * in_band
         if mode == MISSING:
-            return Solution(mp.nan, mp.nan, MISSING, validity)
+            return Solution(gmpy2.nan(), gmpy2.nan(), MISSING, validity)
         if mode == STUCK:
-            return Solution(mpf(0), mpf(0), STUCK, validity, recoupled=True)
+            return Solution(mpfr(0), mpfr(0), STUCK, validity, recoupled=True)
         block = Block(model, rise, recoupling)
-        interface = parameters.interface(mpf(g), mp.tan(mp.radians(mpf(theta))), mpf(mu_s))
+        interface = parameters.interface(mpfr(g), gmpy2.tan(gmpy2.radians(mpfr(theta))), mpfr(mu_s))
         block.meet_interface(interface, peak, dps + 10)
         wave = Waveform(waveform, harmonics, cycles, ramp_in, ramp_out)
         below = False
@@ -259,19 +261,21 @@ recoupling, g
         except NoValueError:
             shaking = [section for n in range(cycles) for section in wave.sections(n, peak)]
             below = _yield_governs(block, _rises(shaking, block.rounding))
-            return Solution(mp.nan, mp.nan, MISSING, validity | KD_NOT_POSITIVE | YIELD_GOVERNS * below, False, below)
+            return Solution(
+                gmpy2.nan(), gmpy2.nan(), MISSING, validity | KD_NOT_POSITIVE | YIELD_GOVERNS * below, False, below
+            )
         validity |= YIELD_GOVERNS * (below and not block.newmark) | NOT_RECOUPLED * block.recoupled_late
         if any(max(section.first, section.last) > block.onset for section in shaking):
             # ramps may keep the shaking below its peak, and the block from sliding
             validity |= _remarks(parameters.acceleration_ratio, block.u < -block.rounding, below, model, given)
-        omega, recoupled = 2 * mp.pi * mpf(frequency), mode == STICK_SLIP and not block.recoupled_late
+        omega, recoupled = 2 * gmpy2.const_pi() * mpfr(frequency), mode == STICK_SLIP and not block.recoupled_late
         return Solution(block.u / omega**2, block.peak / omega, mode, validity, recoupled, below)
 
 
 # --------------------------------------------------------------------------------------------- records
 
 
-def _half_waves(sections: Sequence[Section]) -> Iterator[tuple[int, int, mpf]]:
+def _half_waves(sections: Sequence[Section]) -> Iterator[tuple[int, int, mpfr]]:
     """First and last (exclusive) sections and peaks of the parts above zero."""
     start = None
     for i in range(len(sections) + 1):
@@ -283,7 +287,7 @@ def _half_waves(sections: Sequence[Section]) -> Iterator[tuple[int, int, mpf]]:
             start = i
 
 
-def _cut_at_onsets(sections: list[Section], onset: mpf) -> tuple[list[Section], list[tuple[int, int, mpf]]]:
+def _cut_at_onsets(sections: list[Section], onset: mpfr) -> tuple[list[Section], list[tuple[int, int, mpfr]]]:
     """Sections cut where half waves first reach `onset`; first and last (exclusive) ones of these pulses, and peaks."""
     found: list[Section] = []
     pulses, done = [], 0
@@ -318,18 +322,18 @@ def solve_record(
 ) -> RecordSolution:
     """Response of one block to a record, straight between its samples (docs/records.md); `given` as in `solve`."""
     with workdps(dps + GUARD_DIGITS):
-        values = [mpf(scale) * mpf(float(a)) for a in acceleration]
+        values = [mpfr(scale) * mpfr(float(a)) for a in acceleration]
         sections = sections_of_record(times, values)
-        block, tan_theta = Block(model, rise, recoupling, True), mp.tan(mp.radians(mpf(theta)))
+        block, tan_theta = Block(model, rise, recoupling, True), gmpy2.tan(gmpy2.radians(mpfr(theta)))
 
-        def friction(peak: mpf) -> FrictionParameters:
+        def friction(peak: mpfr) -> FrictionParameters:
             return friction_parameters(theta, mu_s, peak, model=model, g=g, dps=dps, **given)
 
-        onset = friction(mpf(1)).yield_acceleration
+        onset = friction(mpfr(1)).yield_acceleration
         sections, pulses = _cut_at_onsets(sections, onset)
         validity = STATICALLY_UNSTABLE * (onset <= 0)
         if model != "newmark":
-            validity |= UPLIFT * (min(mpf(g) + value * tan_theta for value in values) <= 0)
+            validity |= UPLIFT * (min(mpfr(g) + value * tan_theta for value in values) <= 0)
         modes: list[int] = []
         ends = [*(begin for begin, _, _ in pulses[1:]), len(sections)]
         for (begin, end, peak), following in zip(pulses, ends, strict=False):
@@ -338,8 +342,8 @@ def solve_record(
             validity |= parameters.validity & ~UPLIFT  # which the record itself tells
             validity |= NOT_RECOUPLED * bool(block.v > 0 and not block.newmark and modes and modes[-1] == STICK_SLIP)
             if validity & (STATICALLY_UNSTABLE | UPLIFT | LIMIT_UNDEFINED | FRICTION_NOT_DECAYING):
-                return RecordSolution(mp.nan, mp.nan, -1, -1, -1, validity)
-            block.meet_interface(parameters.interface(mpf(g), tan_theta, mpf(mu_s)), peak, dps + 10)
+                return RecordSolution(gmpy2.nan(), gmpy2.nan(), -1, -1, -1, validity)
+            block.meet_interface(parameters.interface(mpfr(g), tan_theta, mpfr(mu_s)), peak, dps + 10)
             modes.append(mode)
             pulse, after = sections[begin:end], sections[end:following]
             below = mode == STICK_SLIP and _yield_governs(block, [(onset, peak)])
@@ -351,25 +355,25 @@ def solve_record(
             _stick_and_slip(block, pulse)
             # there is a value if b > 0 at the end of the last rise
             if (block.sliding and block.b <= 0) or (block.literal and block.interface.eq4(peak) <= 0):
-                return RecordSolution(mp.nan, mp.nan, -1, -1, -1, validity | KD_NOT_POSITIVE)
+                return RecordSolution(gmpy2.nan(), gmpy2.nan(), -1, -1, -1, validity | KD_NOT_POSITIVE)
             for section in after:
                 block.take(section)
         if block.v != 0:
-            block.brake(mp.inf)
+            block.brake(gmpy2.inf())
         validity |= UPSLOPE * bool(pulses and block.u < -block.rounding)
         counts = (modes.count(STICK_SLIP), modes.count(CONTINUOUS))
         return RecordSolution(block.u, block.peak, block.slips, *counts, validity)
 
 
 def _stick_and_slip(block: Block, pulse: list[Section]) -> None:
-    block.v = max(block.v, mpf(0))
+    block.v = max(block.v, mpfr(0))
     block.sliding, block.reset = block.v > 0, True
     for section in pulse:
         block.take(section)
     block.reset = True  # also where Üg only touches zero
 
 
-def _slide(block: Block, pulse: list[Section], after: list[Section], another: bool, peak: mpf) -> None:
+def _slide(block: Block, pulse: list[Section], after: list[Section], another: bool, peak: mpfr) -> None:
     """A continuous pulse and the negative half wave that follows; up to the next pulse if that follows at once."""
     block.slips += block.v == 0
     bottom = 0

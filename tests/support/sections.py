@@ -7,53 +7,58 @@ from functools import lru_cache
 from itertools import pairwise
 from typing import Any, TypeAlias
 
-from mpmath import mp, mpf, workdps
+import gmpy2
+import mpmath
+from gmpy2 import mpfr
 from scipy.special import roots_legendre
 
-Function: TypeAlias = Callable[[mpf], mpf]
+from tests.support.digits import decimals, epsilon, workdps
+
+Function: TypeAlias = Callable[[mpfr], mpfr]
 
 
 @lru_cache
-def _gauss_legendre(count: int, precision: int) -> list[tuple[mpf, mpf]]:
-    """Nodes and weights of the `count`-point rule on (0, 1), at `precision` bits."""
+def _gauss_legendre(count: int, digits: int) -> list[tuple[mpfr, mpfr]]:
+    """Nodes and weights of the `count`-point rule on (0, 1)."""
     rule = []
-    for near in roots_legendre(count)[0]:
-        node = mp.findroot(lambda x: mp.legendre(count, x), mpf(near))
-        weight = (1 - node**2) / ((count + 1) * mp.legendre(count + 1, node)) ** 2
-        rule.append(((1 + node) / 2, weight))
+    with mpmath.workdps(digits):
+        for near in roots_legendre(count)[0]:
+            node = mpmath.findroot(lambda x: mpmath.legendre(count, x), near)
+            weight = (1 - node**2) / ((count + 1) * mpmath.legendre(count + 1, node)) ** 2
+            rule.append((mpfr(str((1 + node) / 2)), mpfr(str(weight))))
     return rule
 
 
-def root(f: Function, low: mpf, high: mpf) -> mpf:
+def root(f: Function, low: mpfr, high: mpfr) -> mpfr:
     """Root of `f` in a bracket: bisection made faster by inverse quadratic steps (Chandrupatla)."""
     a, b = high, low
     f_a, f_b = f(a), f(b)
     if f_a == 0 or f_b == 0:
         return a if f_a == 0 else b
-    assert mp.sign(f_a) != mp.sign(f_b), "no change of sign in the bracket"
-    width = mpf(1) / 2
+    assert gmpy2.sign(f_a) != gmpy2.sign(f_b), "no change of sign in the bracket"
+    width = mpfr(1) / 2
     while True:
         x = a + width * (b - a)
         f_x = f(x)
-        if mp.sign(f_x) == mp.sign(f_a):
+        if gmpy2.sign(f_x) == gmpy2.sign(f_a):
             c, f_c = a, f_a
         else:
             c, f_c = b, f_b
             b, f_b = a, f_a
         a, f_a = x, f_x
         best = a if abs(f_a) < abs(f_b) else b
-        tolerance = 4 * mp.eps * abs(best) / abs(b - a) if b != a else mpf(1)
+        tolerance = 4 * epsilon() * abs(best) / abs(b - a) if b != a else mpfr(1)
         if tolerance > 0.5 or f_a == 0:
             return best
         xi, phi = (a - b) / (c - b), (f_a - f_b) / (f_c - f_b)
         if phi**2 < xi and (1 - phi) ** 2 < 1 - xi:
             width = f_a / (f_b - f_a) * f_c / (f_b - f_c) + (c - a) / (b - a) * f_a / (f_c - f_a) * f_b / (f_c - f_b)
         else:
-            width = mpf(1) / 2
+            width = mpfr(1) / 2
         width = min(1 - tolerance, max(tolerance, width))
 
 
-def _zeros(f: Function, grid: Sequence[mpf]) -> list[mpf]:
+def _zeros(f: Function, grid: Sequence[mpfr]) -> list[mpfr]:
     values = [f(x) for x in grid]
     return [root(f, a, b) for (a, x), (b, y) in pairwise(zip(grid, values, strict=True)) if x * y < 0]
 
@@ -68,43 +73,43 @@ class Section:
     `longest` is the length on which the rule of many nodes is exact, and `nodes` are those that Üg itself takes.
     """
 
-    start: mpf
-    end: mpf
-    first: mpf
-    last: mpf
+    start: mpfr
+    end: mpfr
+    first: mpfr
+    last: mpfr
     ground: Function
-    longest: mpf
+    longest: mpfr
     nodes: int
 
     @property
     def side(self) -> int:
-        return int(mp.sign(self.first + self.last))
+        return int(gmpy2.sign(self.first + self.last))
 
-    def phase(self, ground: mpf) -> mpf:
+    def phase(self, ground: mpfr) -> mpfr:
         """Where the base's acceleration is `ground`, a value between the first and the last."""
-        rounding = mp.eps * 2**20 * abs(self.last - self.first)
+        rounding = epsilon() * 2**20 * abs(self.last - self.first)
         for end, value in ((self.start, self.first), (self.end, self.last)):
             if abs(ground - value) <= rounding:
                 return end
         return root(lambda phi: self.ground(phi) - ground, self.start, self.end)
 
-    def cut(self, ground: mpf) -> "Section":
+    def cut(self, ground: mpfr) -> "Section":
         """The part from `ground` on."""
         return replace(self, start=self.phase(ground), first=ground)
 
-    def integrals(self, rate: Function, start: mpf, end: mpf, decay: mpf) -> tuple[mpf, mpf]:
+    def integrals(self, rate: Function, start: mpfr, end: mpfr, decay: mpfr) -> tuple[mpfr, mpfr]:
         """Integrals of rate(Üg) and of (end - φ) rate(Üg); `decay` is that of the friction in it, 1/(m/s²)."""
-        rule = _gauss_legendre(30 if decay else self.nodes, mp.prec)
+        rule = _gauss_legendre(30 if decay else self.nodes, decimals())
         cuts = [start, end]
         if decay:  # the friction falls by e^-8 at most over a part, until it is negligible
             least, greatest = sorted((abs(self.ground(start)), abs(self.ground(end))))
-            count = min(int((greatest - least) * decay / 8.001), int(mp.dps * math.log(10) / 8))
+            count = min(int(gmpy2.floor((greatest - least) * decay / 8.001)), int(decimals() * math.log(10) / 8))
             levels = [self.side * (least + 8 * j / decay) for j in range(1, count + 1)]
             with workdps(15):  # these places are of no consequence to the last digit
                 cuts[1:1] = sorted(self.phase(x) for x in levels)
-        first = second = mpf(0)
+        first = second = mpfr(0)
         for a, b in pairwise(cuts):
-            parts = int(mp.ceil((b - a) / self.longest))
+            parts = int(gmpy2.ceil((b - a) / self.longest))
             for i in range(parts):
                 left, width = a + (b - a) * i / parts, (b - a) / parts
                 for node, weight in rule:
@@ -125,59 +130,57 @@ class Waveform:
     ramp_in: float
     ramp_out: float
 
-    def terms(self) -> list[tuple[mpf, int, mpf]]:
+    def terms(self) -> list[tuple[mpfr, int, mpfr]]:
         text = {"cosine": "1:1:90", "harmonics": self.harmonics}.get(self.name, "1:1:0")
         rows = [term.split(":") for term in text.split(",")]
-        return [(mpf(float(a)), int(m), mp.radians(mpf(float(p)))) for a, m, p in rows]
+        return [(mpfr(float(a)), int(m), gmpy2.radians(mpfr(float(p)))) for a, m, p in rows]
 
     def alike(self, n: int) -> int:
         """Number of cycles from cycle n on that are the same; 1 within a ramp."""
         return max(1, self.cycles - math.ceil(self.ramp_out) - n) if n >= math.ceil(self.ramp_in) else 1
 
-    def sections(self, n: int, amplitude: mpf) -> Iterator[Section]:
+    def sections(self, n: int, amplitude: mpfr) -> Iterator[Section]:
         """Cycle n, its phase from 0 on."""
         first_alike = math.ceil(self.ramp_in)
         number = first_alike if self.alike(first_alike) > n - first_alike >= 0 else n
-        for start, end, first, last, unit, longest, nodes in _unit_sections(self, number, mp.prec):
+        for start, end, first, last, unit, longest, nodes in _unit_sections(self, number, decimals()):
 
-            def ground(phi: mpf, unit: Function = unit) -> mpf:
+            def ground(phi: mpfr, unit: Function = unit) -> mpfr:
                 return amplitude * unit(phi)
 
             yield Section(start, end, amplitude * first, amplitude * last, ground, longest, nodes)
 
 
 @lru_cache
-def _unit_sections(wave: Waveform, n: int, precision: int) -> list[tuple[Any, ...]]:
+def _unit_sections(wave: Waveform, n: int, digits: int) -> list[tuple[Any, ...]]:
     """The sections of a cycle for A = 1."""
-    quarter, terms = mp.pi / 2, wave.terms()
+    quarter, terms = gmpy2.const_pi() / 2, wave.terms()
     fastest = max(m for _, m, _ in terms)
-    pieces = [(mpf(0), 4 * quarter, lambda phi: _harmonic(terms, phi), lambda phi: _harmonic_slope(terms, phi))]
-    if wave.name == "sine":  # the same, in a third of the time
-        pieces = [(mpf(0), 4 * quarter, mp.sin, mp.cos)]
+    pieces = [(mpfr(0), 4 * quarter, lambda phi: _harmonic(terms, phi), lambda phi: _harmonic_slope(terms, phi))]
     if wave.name in ("triangle", "square"):
         lines = [(0, 1), (2, -1), (2, -1), (-4, 1)] if wave.name == "triangle" else [(1, 0), (1, 0), (-1, 0), (-1, 0)]
         pieces = [(i * quarter, (i + 1) * quarter, *_line(at, rate / quarter)) for i, (at, rate) in enumerate(lines)]
-    scale = mpf(1)
+    scale = mpfr(1)
     if wave.name == "harmonics":
         grid = [4 * quarter * i / (24 * fastest) for i in range(24 * fastest + 1)]
         scale = max(abs(_harmonic(terms, phi)) for phi in _zeros(lambda phi: _harmonic_slope(terms, phi), grid))
-    kinks = [4 * quarter * (mpf(wave.ramp_in) - n), 4 * quarter * (wave.cycles - mpf(wave.ramp_out) - n)]
+    kinks = [4 * quarter * (mpfr(wave.ramp_in) - n), 4 * quarter * (wave.cycles - mpfr(wave.ramp_out) - n)]
     found = []
     for start, end, w, slope in pieces:
         for a, b in pairwise([start, *(kink for kink in kinks if start < kink < end), end]):
-            height, incline = mpf(1) / scale, mpf(0)
+            height, incline = mpfr(1) / scale, mpfr(0)
             if (a + b) / 2 < kinks[0]:
-                height, incline = n / mpf(wave.ramp_in) / scale, 1 / (4 * quarter * mpf(wave.ramp_in)) / scale
+                height, incline = n / mpfr(wave.ramp_in) / scale, 1 / (4 * quarter * mpfr(wave.ramp_in)) / scale
             elif (a + b) / 2 > kinks[1]:
-                height = (wave.cycles - n) / mpf(wave.ramp_out) / scale
-                incline = -1 / (4 * quarter * mpf(wave.ramp_out)) / scale
+                height = (wave.cycles - n) / mpfr(wave.ramp_out) / scale
+                incline = -1 / (4 * quarter * mpfr(wave.ramp_out)) / scale
 
-            def unit(phi: mpf, w: Function = w, height: mpf = height, incline: mpf = incline) -> mpf:
+            def unit(phi: mpfr, w: Function = w, height: mpfr = height, incline: mpfr = incline) -> mpfr:
                 return (height + incline * phi) * w(phi)
 
             def rate(
-                phi: mpf, w: Function = w, dw: Function = slope, height: mpf = height, incline: mpf = incline
-            ) -> mpf:
+                phi: mpfr, w: Function = w, dw: Function = slope, height: mpfr = height, incline: mpfr = incline
+            ) -> mpfr:
                 return incline * w(phi) + (height + incline * phi) * dw(phi)
 
             straight = wave.name in ("triangle", "square")
@@ -186,10 +189,10 @@ def _unit_sections(wave: Waveform, n: int, precision: int) -> list[tuple[Any, ..
             turns = [] if wave.name == "square" and not incline else _zeros(rate, grid)
             ends = [a]
             for phi in [*sorted([*zeros, *turns]), b]:
-                if phi - ends[-1] > mpf(10) ** (-mp.dps // 2):
+                if phi - ends[-1] > mpfr(10) ** (-decimals() // 2):
                     ends.append(phi)
             for x, y in pairwise(ends):
-                values = [mpf(0) if abs(unit(phi)) < mp.eps * 2**20 else unit(phi) for phi in (x, y)]
+                values = [mpfr(0) if abs(unit(phi)) < epsilon() * 2**20 else unit(phi) for phi in (x, y)]
                 shape = w if height == 1 and incline == 0 else unit
                 found.append(
                     (x, y, *values, shape, 4 * quarter if straight else quarter / 2 / fastest, 2 if straight else 12)
@@ -197,30 +200,30 @@ def _unit_sections(wave: Waveform, n: int, precision: int) -> list[tuple[Any, ..
     return found
 
 
-def _harmonic(terms: list[tuple[mpf, int, mpf]], phi: mpf) -> mpf:
-    return mp.fsum(a * mp.sin(m * phi + p) for a, m, p in terms)
+def _harmonic(terms: list[tuple[mpfr, int, mpfr]], phi: mpfr) -> mpfr:
+    return sum((a * gmpy2.sin(m * phi + p) for a, m, p in terms), mpfr(0))
 
 
-def _harmonic_slope(terms: list[tuple[mpf, int, mpf]], phi: mpf) -> mpf:
-    return mp.fsum(a * m * mp.cos(m * phi + p) for a, m, p in terms)
+def _harmonic_slope(terms: list[tuple[mpfr, int, mpfr]], phi: mpfr) -> mpfr:
+    return sum((a * m * gmpy2.cos(m * phi + p) for a, m, p in terms), mpfr(0))
 
 
-def _line(at: int, rate: mpf) -> tuple[Function, Function]:
+def _line(at: int, rate: mpfr) -> tuple[Function, Function]:
     """A straight line and its slope."""
     return (lambda phi: at + rate * phi), (lambda phi: rate)
 
 
-def sections_of_record(times: Any, values: Sequence[mpf]) -> list[Section]:
+def sections_of_record(times: Any, values: Sequence[mpfr]) -> list[Section]:
     """Straight lines between the samples, cut at zero."""
     found = []
     for (t0, first), (t1, last) in pairwise(zip(times, values, strict=True)):
-        length = mpf(t1) - mpf(t0)
-        ends = [(mpf(0), first), (length, last)]
+        length = mpfr(t1) - mpfr(t0)
+        ends = [(mpfr(0), first), (length, last)]
         if first * last < 0:
-            ends.insert(1, (-first * length / (last - first), mpf(0)))
+            ends.insert(1, (-first * length / (last - first), mpfr(0)))
         for (a, x), (b, y) in pairwise(ends):
 
-            def ground(t: mpf, a: mpf = a, x: mpf = x, slope: mpf = (y - x) / (b - a)) -> mpf:
+            def ground(t: mpfr, a: mpfr = a, x: mpfr = x, slope: mpfr = (y - x) / (b - a)) -> mpfr:
                 return x + slope * (t - a)
 
             found.append(Section(a, b, x, y, ground, b - a, 2))
