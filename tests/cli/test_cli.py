@@ -5,11 +5,8 @@ import csv
 import os
 import re
 import resource
-import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import netCDF4
@@ -27,17 +24,6 @@ theta.values = [0, 5]
 mu_s.values = [0.3, 0.5]
 amplitude.values = [1, 4]
 frequency.values = [1, 2]
-"""
-
-#: Two thousand million cells, a byte each: minutes of work.
-LONG = """
-[axes]
-theta = {start = 0, stop = 20, num = 200}
-mu_s = {start = 0.2, stop = 0.9, num = 100}
-amplitude = {start = 0.5, stop = 14, num = 1000}
-frequency = {start = 0.1, stop = 20, num = 100}
-[output]
-variables = ["sliding_mode"]
 """
 
 SIMULATE = ("simulate", "--theta", "5", "--mu-s", "0.38", "--amplitude", "3.55", "--frequency", "1.8")
@@ -71,7 +57,7 @@ def names(folder: Path) -> set[str]:
 
 
 def test_run_paper(tmp_path: Path) -> None:
-    done = slipsweep(tmp_path, "run", SWEEPS / "paper.toml")
+    done = command(tmp_path, "run", SWEEPS / "paper.toml")
     assert done.returncode == 0
     assert done.stderr == ""  # no progress bar but on a terminal
     assert done.stdout.startswith("2 cells (2 case) in ")
@@ -174,7 +160,6 @@ def limited() -> None:
 @pytest.mark.parametrize(
     ("arguments", "name"),
     [
-        (("run", "small.toml", "-o", "a.nc"), "a.nc"),
         (("chart", "small.nc", "-k", "contours", "-o", "a.pdf"), "a.pdf"),
         (("export", "small.nc", "-o", "a.xlsx"), "a.xlsx"),
     ],
@@ -201,32 +186,6 @@ def test_output_that_is_lost_is_said(small: Path) -> None:
     assert (small / "small.nc").exists()
 
 
-@pytest.mark.skipif(os.name != "posix", reason="sends signals")
-def test_an_interrupted_run_keeps_its_finished_chunks(tmp_path: Path) -> None:
-    (tmp_path / "long.toml").write_text(LONG)
-    with subprocess.Popen(
-        [*SLIPSWEEP, "run", "long.toml"], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        try:
-            wait_until(lambda: any(tmp_path.glob("long.nc.part/*.chunk")))
-            assert process.poll() is None
-            process.send_signal(signal.SIGINT)
-            output, errors = process.communicate(timeout=60)
-        finally:
-            process.kill()
-    assert (process.returncode, output) == (130, "")
-    assert re.fullmatch(r"slipsweep: interrupted; \d+ of \d+ chunks are kept.*--resume.*\n", errors)
-    assert not (tmp_path / "long.nc").exists()
-    assert_fails(slipsweep(tmp_path, "run", "long.toml"), 2, "--resume")
-
-
-def wait_until(condition: Callable[[], bool]) -> None:
-    end = time.monotonic() + 180
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
-
-
 def test_settings_of_other_programs_do_no_harm(small: Path) -> None:
     setting = {"MPLBACKEND": "nonsense", "PYTHONIOENCODING": "ascii"}
     done = slipsweep(small, "limit", "small.toml", "-d", "50mm", "-o", "limit.png", environment=setting)
@@ -245,18 +204,10 @@ sys.exit(main())
 """
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("run", "small.toml", "-o", "a.nc"),
-        ("chart", "small.nc", "-k", "contours", "-o", "a.png"),
-    ],
-)
-def test_a_user_without_home_and_account_is_served(small: Path, arguments: tuple[str, ...]) -> None:
-    assert command(small, "run", "small.toml").returncode == 0
+def test_a_user_without_home_and_account_is_served(small: Path) -> None:
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("HOME", "XDG"))}
     done = subprocess.run(
-        [sys.executable, "-c", NOBODY, *arguments], cwd=small, env=environment, capture_output=True, text=True,
+        [sys.executable, "-c", NOBODY, "run", "small.toml"], cwd=small, env=environment, capture_output=True, text=True,
         timeout=300, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -314,16 +265,15 @@ def test_simulate_writes_every_kind(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("without_layout")
 def test_a_report_has_a_title_page_and_a_chart_a_page(small: Path) -> None:
-    (small / "a.toml").write_text(f'{SMALL}[model]\nfriction = "newmark"\n')
-    assert command(small, "run", "a.toml").returncode == 0
-    done = command(small, "report", "a.nc")
-    assert (done.returncode, done.stdout, done.stderr) == (0, "a.pdf\n", "")
-    content = (small / "a.pdf").read_bytes()
-    # contours, modes, families, dimensionless, spread; no ratio of Newmark's block to itself
-    assert len(re.findall(rb"/Type /Page\b", content)) == 1 + 5
-    assert_fails(command(small, "report", "a.nc"), 2, "a.pdf: exists already; give --overwrite")
-    assert_fails(command(small, "report", "a.nc", "-o", "a.png"), 2, "a.png: the name must end in .pdf")
-    assert (small / "a.pdf").read_bytes() == content
+    assert command(small, "run", "small.toml").returncode == 0
+    done = command(small, "report", "small.nc")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "small.pdf\n", "")
+    content = (small / "small.pdf").read_bytes()
+    # contours, modes, families, dimensionless, spread, ratio
+    assert len(re.findall(rb"/Type /Page\b", content)) == 1 + 6
+    assert_fails(command(small, "report", "small.nc"), 2, "small.pdf: exists already; give --overwrite")
+    assert_fails(command(small, "report", "small.nc", "-o", "a.png"), 2, "a.png: the name must end in .pdf")
+    assert (small / "small.pdf").read_bytes() == content
 
 
 # ------------------------------------------------------------------------- help and progress
