@@ -266,6 +266,16 @@ def test_all_results_of_a_chunk_are_computed_once(cells_solved: list[int]) -> No
 # ------------------------------------------------------------------------------ attributes
 
 
+def test_a_history_has_the_results_of_the_sweep() -> None:
+    block: dict[str, Any] = {**GOOD, "yield_acceleration": 0.59, "excitation": slipsweep.Sine(cycles=5)}
+    history, swept = slipsweep.simulate(**block), slipsweep.sweep(**block)
+    assert history.relative_displacement.dims == ("time",)
+    xr.testing.assert_identical(
+        history[list(DEFAULT_RESULTS)].drop_vars("time", errors="ignore"), swept.assign_attrs(history.attrs)
+    )
+    assert history.relative_displacement[-1].item() == pytest.approx(swept.permanent_displacement.item(), rel=1e-13)
+
+
 def test_attributes_tell_how_it_was_made() -> None:
     attrs = slipsweep.sweep(**GOOD, excitation=slipsweep.Sine(cycles=3)).attrs
     assert attrs["title"] == "Permanent displacement of a rigid block, swept"
@@ -283,16 +293,6 @@ def test_attributes_tell_how_it_was_made() -> None:
     assert slipsweep.friction_parameters(5.0, 0.38, 3.0).attrs.keys() == {
         "title", "source", "references", "model", "rise", "recoupling", "g"
     }  # fmt: skip
-
-
-def test_a_history_has_the_results_of_the_sweep() -> None:
-    block: dict[str, Any] = {**GOOD, "yield_acceleration": 0.59, "excitation": slipsweep.Sine(cycles=5)}
-    history, swept = slipsweep.simulate(**block), slipsweep.sweep(**block)
-    assert history.relative_displacement.dims == ("time",)
-    xr.testing.assert_identical(
-        history[list(DEFAULT_RESULTS)].drop_vars("time", errors="ignore"), swept.assign_attrs(history.attrs)
-    )
-    assert history.relative_displacement[-1].item() == pytest.approx(swept.permanent_displacement.item(), rel=1e-13)
 
 
 # ---------------------------------------------------------------------------------- errors
