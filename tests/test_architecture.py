@@ -25,7 +25,7 @@ LINES = {
     "kernels": 3_148,
     "grid": 1_047,
     "studies": 3_883,
-    "files": 1_877,
+    "files": 1_887,
     "charts": 2_486,
     "explore": 694,
     "cli": 1_256,

@@ -149,10 +149,12 @@ def test_a_run_goes_on_with_its_own_chunks_only(folder: Path, output: str, monke
     with pytest.raises(RunError, match="writing failed: Is a directory"):
         stored(job_of(folder, "sweep"), path, resume=True)
     identity.rmdir()
+    with pytest.raises(InputError, match="has chunks that nothing identifies"):
+        stored(job_of(folder, "sweep"), path, resume=True)
     kept.rename(identity)
-    report = stored(job_of(folder, "sweep"), path, resume=True)  # with the chunks it was begun with
+    monkeypatch.setattr(running, "CHUNK_CELLS", 2)  # as with workers
+    assert not stored(job_of(folder, "sweep"), path, resume=True).found  # with the chunks it was begun with
     assert sorted(seen) == list(range(24))
-    assert not report.found
     stored(job_of(folder, "sweep"), folder / "whole.nc")
     xr.testing.assert_identical(without_time(read_result(path)), without_time(read_result(folder / "whole.nc")))
 

@@ -93,9 +93,10 @@ def run(
     if resume and (complete := _complete(job, path)) is not None:
         return Report(path, tally_of(complete), found=True)
     processes = workers or (64 if scheduler else 0)
-    lengths = chunk_lengths(plan.sizes, _chunk_cells(plan, memory, processes, workers or 0), plan.together)
+    most = _most_cells(plan, memory, workers or 0)
+    lengths = chunk_lengths(plan.sizes, _chunk_cells(plan, most, processes), plan.together)
     is_zarr = isinstance(path, str) or path.suffix == ".zarr"
-    chunks = (ZarrChunks if is_zarr else Chunks)(job, path, lengths)
+    chunks = (ZarrChunks if is_zarr else Chunks)(job, path, lengths, most)
     if lengths == plan.sizes and not is_zarr and not processes and not Path(chunks.place).exists():
         with named(job.spec.source):
             table = plan.solve(progress)
@@ -136,14 +137,10 @@ def _complete(job: Job, path: Place) -> xr.Dataset | None:
     return found
 
 
-def _chunk_cells(plan: Plan, memory: int | None, processes: int, workers: int) -> int:
-    """How many cells a chunk may have: seconds of work, within the memory, and enough chunks for all processes."""
-    cells = max(1, int(CHUNK_CELLS / plan.cost))
-    if processes:
-        share = math.prod(plan.sizes.values()) // (_CHUNKS_A_WORKER * processes)
-        cells = min(cells, max(math.ceil(_LEAST_WORK / plan.cost), share))
+def _most_cells(plan: Plan, memory: int | None, workers: int) -> float:
+    """How many cells of a chunk the memory holds, if it is limited."""
     if memory is None:
-        return cells
+        return math.inf
     base = _BASE_MEMORY + plan.memory + workers * (_WORKER_MEMORY + plan.memory)
     results = sum(
         one.dtype.itemsize * math.prod(size for dim, size in one.sizes.items() if dim not in plan.sizes)
@@ -151,10 +148,20 @@ def _chunk_cells(plan: Plan, memory: int | None, processes: int, workers: int) -
     )
     # in this process a chunk and its copies while it is written; a worker has one, and others are on their way
     cell = (2 + 3 * workers) * results + plan.cell_memory + 8
-    within = (memory - base) // cell
-    if within < 1000:
+    most = (memory - base) // cell
+    if most < 1000:
         raise InputError(f"--memory = {size_text(memory)}: must be {size_text(1.01 * (base + 1000 * cell))} at least")
-    return int(min(within, cells) if plan.cost > 1.0 or processes else within)
+    return most
+
+
+def _chunk_cells(plan: Plan, most: float, processes: int) -> int:
+    """How many cells a chunk has: seconds of work, and enough chunks for all processes; cheap ones fill the memory."""
+    cells = max(1, int(CHUNK_CELLS / plan.cost))
+    if processes:
+        share = math.prod(plan.sizes.values()) // (_CHUNKS_A_WORKER * processes)
+        cells = min(cells, max(math.ceil(_LEAST_WORK / plan.cost), share))
+    fills = math.isfinite(most) and plan.cost <= 1.0 and not processes
+    return int(most if fills else min(most, cells))
 
 
 @contextmanager

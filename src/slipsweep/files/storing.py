@@ -54,6 +54,7 @@ class Chunks:
     job: Job
     path: Place
     lengths: dict[str, int]  # of a chunk, along each dimension of the grid
+    most: float = math.inf  # cells of a chunk that the memory asked for holds
     done: set[int] = field(default_factory=set)  # what an interrupted run has left
     name: ClassVar[str] = "result.nc"  # of the file or store that chunks are written to, within `place`
 
@@ -106,13 +107,15 @@ class Chunks:
             with held:
                 yield
         finally:
-            if folder.is_dir() and not (folder / "identity.json").exists():
+            if folder.is_dir() and not (folder / "identity.json").exists() and not self._finished():
                 shutil.rmtree(folder, ignore_errors=True)
 
     def _begin(self, command: str, resume: bool, overwrite: bool) -> None:
         state = None
         with writing(self.path), suppress(FileNotFoundError, ValueError):
             state = json.loads(self._files.cat_file(f"{self._folder}/identity.json"))
+        if state is None and not overwrite and self._finished():
+            raise InputError(f"{self.place}: has chunks that nothing identifies; --overwrite starts again without them")
         if state is None or overwrite:
             self._clear()
             if isinstance(self.path, Path):
@@ -135,7 +138,7 @@ class Chunks:
             fault = "has chunks of an interrupted run; give --resume to go on with them"
         elif others:
             fault = f"has chunks of another {others[0]}; go on with that one"
-        elif math.prod(state["lengths"].values()) > math.prod(self.lengths.values()):
+        elif math.prod(state["lengths"].values()) > self.most:
             fault = "has larger chunks than fit into the memory asked for; give more --memory"
         if fault:
             raise InputError(f"{self.place}: {fault}, or --overwrite to start again")

@@ -147,7 +147,7 @@ def sweep(
     ------
     InputError
         A physically impossible value, an unknown option, a grid that memory cannot hold.  A result that double
-        precision does not hold (of inputs beyond 1e40, say) is refused when it is computed: with `chunks`, later.
+        precision does not hold (of inputs near their bounds) is refused when it is computed: with `chunks`, later.
 
     See Also
     --------
