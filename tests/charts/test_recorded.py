@@ -196,6 +196,14 @@ def test_a_single_record() -> None:
     for line, mu_s in zip(labelled(figure, "μs"), result.mu_s, strict=True):
         expected = result.permanent_displacement.sel(mu_s=mu_s, polarity=1) * 1000.0  # the record as it is
         np.testing.assert_allclose(line.get_ydata()[expected > 0], expected[expected > 0], rtol=1e-12)
+    # marked as unsound: where the displacement falls as the shaking grows
+    scales = np.linspace(0.5, 12, 60)
+    many = slipsweep.sweep(0.0, 0.3, excitation=record, scale=scales, polarity=-1).squeeze()
+    u, sound = many.permanent_displacement.values, ~slipsweep.flags(many).not_recoupled.values
+    marked = [line.get_xdata()[np.isfinite(line.get_ydata())] for line in named(many.slipsweep.chart(), "unsound")]
+    np.testing.assert_array_equal(
+        np.isin(scales[1:], np.concatenate(marked)), (u[1:] < u[:-1]) & (u[1:] > 0) & sound[1:]
+    )
 
 
 def test_newmarks_block_is_solved_under_the_record_in_the_file(tmp_path: Path) -> None:
@@ -229,7 +237,7 @@ def test_limits_of_a_suite(suite: slipsweep.Suite) -> None:
     ordered = np.sort(limits.limit_amplitude.fillna(np.inf).values, axis=-1)
     np.testing.assert_allclose(median.get_ydata(), ordered[:, 3:5].mean(axis=1) / 9.81, rtol=1e-12)
     assert len(named(figure, "motion")) == 8
-    assert f"{missing.sum()} of 16 limits are above" in caption(figure)
+    assert f"{missing.sum()} of 16 limits are above {7.2 / 9.81:.4g} g;" in caption(figure)
     # where nothing varies but the motion, they lie along the abscissa
     axes = Figure().subplots()
     assert limits.isel(mu_s=0).slipsweep.chart(ax=axes) is axes
@@ -334,3 +342,5 @@ def test_statistics_are_drawn_as_they_are() -> None:
     names = {"A": "amplitude", "μs": "mu_s"}
     np.testing.assert_allclose(totals, [point.sel(input=names[symbol]).item() for symbol in order])
     assert totals == sorted(totals)
+    found.valueless_share[0] = 0.25
+    assert "up to 25.0% of the samples" in caption(found.slipsweep.chart("quantiles", at={"frequency": 2}))

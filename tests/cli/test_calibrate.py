@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
 
@@ -34,6 +35,10 @@ def test_friction_writes_what_it_finds(capsys: pytest.CaptureFixture[str]) -> No
 def test_friction_takes_offsets_off_by_the_rest(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["friction", TEST, *BLOCK, "--offset", "all", "--rest", "0", "0.45"]) == 0
     assert "removed    ground_acceleration: " in capsys.readouterr().out
+    assert cli.main(["friction", TEST, *BLOCK, "--g", "9.7", "-o", "g.nc"]) == 0
+    with xr.open_dataset("g.nc") as found:
+        expected = slipsweep.measured_friction(TEST, 5.0, 0.38, g=9.7).free_body_friction
+        np.testing.assert_array_equal(found.free_body_friction, expected)
 
 
 def test_calibrate_writes_what_it_finds(capsys: pytest.CaptureFixture[str]) -> None:
@@ -45,6 +50,8 @@ def test_calibrate_writes_what_it_finds(capsys: pytest.CaptureFixture[str]) -> N
         assert abs(found.yield_acceleration - 1.8) < 3.5 * found.yield_acceleration_error
         assert found.sizes["cycle"] == 8
         assert "constant_friction" in found.attrs
+        misfit = f"misfit {1000 * found.misfit_relative_displacement.item():.2g} mm"
+    assert misfit in Path("calibration.svg").read_text()
     assert Path("model.toml").read_text() in printed
     assert "[uncertainty.decay_rate]" in Path("model.toml").read_text()
     assert Path("calibration.svg").read_text().count("misfit") == 3

@@ -245,6 +245,7 @@ def test_simulate_writes_every_kind(tmp_path: Path) -> None:
     assert done.stdout.endswith("".join(f"{output}\n" for output in outputs))
     assert names(tmp_path) == set(outputs)
     with xr.open_dataset(tmp_path / "a.nc") as dataset:
+        assert float(dataset["time"][1]) == pytest.approx(1 / (1.8 * 64))
         displacement = dataset["relative_displacement"]
         assert displacement.dims == dataset["time"].dims == ("instant",)
         with (tmp_path / "a.csv").open(newline="") as file:
@@ -269,6 +270,7 @@ def test_a_report_has_a_title_page_and_a_chart_a_page(small: Path) -> None:
     assert_fails(command(small, "report", "small.nc"), 2, "small.pdf: exists already; give --overwrite")
     assert_fails(command(small, "report", "small.nc", "-o", "a.png"), 2, "a.png: the name must end in .pdf")
     assert (small / "small.pdf").read_bytes() == content
+    assert command(small, "report", "small.nc", "--overwrite").returncode == 0
 
 
 # ------------------------------------------------------------------------- help and progress

@@ -1,5 +1,6 @@
 """Units as people type them, names as commands can write them, and a reason where there is no number."""
 
+import math
 from pathlib import Path
 
 import pytest
@@ -82,6 +83,9 @@ def test_reasons_and_remedies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     (tmp_path / "a.csv").write_text("0,1\n1,-999\n2,0\n")
     message = told("simulate", "--record", "a.csv", "--units", "m/s2", *BLOCK[1:5], status=2)
     assert "--gaps linear interpolates" in message
+    (tmp_path / "c.toml").write_text(SWEEP.replace("[4]", "[0.1]").replace("[5]", "[0, 5]"))
+    smallest = 9.81 * math.tan(math.atan(0.4) - math.radians(5))
+    assert f"smallest yield acceleration {smallest:.6g} m/s2" in told("run", "c.toml")
     axes = SWEEP.replace("mu_s", "phi").replace("0.4", "20, 22").replace("[4]", "[2, 4, 6, 8, 10, 12]")
     (tmp_path / "b.toml").write_text(axes)
     assert "unsound: the displacement falls with A in " in told("run", "b.toml")

@@ -95,6 +95,8 @@ def test_page_holds_the_dataset(result: Path, written: Path) -> None:
     text = json.dumps(meta["figures"], ensure_ascii=False)
     assert '"excitation frequency f (Hz), logarithmic scale"' in text
     assert '"peak ground acceleration A (m/s²)"' in text
+    assert '[10.0, "10 mm"]' in text  # of the bar of colours
+    assert meta["unsound"] == int(CAUTIONS | VALUELESS)
     assert "All 2,484 cells of the file are in this page." in written.read_text()
 
 
@@ -197,6 +199,12 @@ def test_friction_angles(tmp_path: Path, text: str, dim: str) -> None:
     meta, _ = contents(tmp_path / "a.html")
     assert meta["histories"] is not None
     assert dim in axes_of(meta)
+
+
+@pytest.mark.parametrize("ramp", ["ramp_in", "ramp_out"])
+def test_no_histories_of_waves_that_end_beyond_them(tmp_path: Path, ramp: str) -> None:
+    write_page(make(tmp_path, f"{SWEEP}excitation.{ramp} = 1\n"), tmp_path / "a.html")
+    assert (contents(tmp_path / "a.html")[0]["histories"] is None) == (ramp == "ramp_out")
 
 
 @pytest.mark.parametrize("drawn", [False, True])
@@ -436,12 +444,16 @@ def test_history_is_of_the_very_cell_that_is_named(opened: Any) -> None:
     for values, exact in ((drawn[1], expected.relative_velocity), (drawn[2], expected.relative_displacement * 1000)):
         assert float(exact.max()) > 0.0
         np.testing.assert_allclose(values, exact, rtol=0, atol=float(exact.max()) / 30_000)
+    (said,) = re.findall(r"at the end ([\d.]+ m?m)\.$", text_of(opened, "history-summary"))
+    assert said == f"{drawn[2][-1]:.{len(said.split()[0].partition('.')[2])}f} mm"
 
 
 def test_map_colours_are_the_dataset(opened: Any) -> None:
     """The picture itself: every pixel has the displacement of the cell it lies in."""
     move(opened, 1, 0)
     shape, values = opened.execute_script(FOUND + "const d = found('colours').data.image[0]; return [d.shape, [...d]]")
+    in_g, top = opened.execute_script(FOUND + "return [found('map_g').end, found('y_range').end]")
+    assert in_g * 9.81 == pytest.approx(top)
     seen = np.reshape(np.array(values, float), shape)  # from below
     mm = 1000 * sweep(5, 0.3, *AXES[2:], excitation=Sine(cycles=4)).permanent_displacement.values
     rows = ((np.arange(23) + 0.5) * seen.shape[0] / 23).astype(int)

@@ -311,6 +311,7 @@ def test_accelerations_in_g(folder: Path, tmp_path: Path) -> None:
     ("num", "options", "message"),
     [
         (1200, {}, "the table has 1440000 rows (1200 theta x 1200 mu_s) and 3 columns, a sheet of .xlsx 1048576"),
+        (524288, {}, "the table has 1048576 rows"),
         (17000, {"columns": "theta"}, "and 17001 columns, a sheet of .xlsx 1048576 with its header and 16384"),
     ],
 )  # fmt: skip

@@ -3,6 +3,7 @@
 import math
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -108,6 +109,7 @@ def test_a_file_in_chunks_is_compressed(folder: Path, monkeypatch: pytest.Monkey
     with xr.open_dataset(folder / "a.nc") as one, xr.open_dataset(folder / "b.nc") as other:
         xr.testing.assert_equal(one, other)
         assert (one.validity.encoding["zlib"], one.validity.encoding["complevel"]) == (True, 4)
+        assert one.attrs["history"].endswith(" slipsweep run")
 
 
 @pytest.mark.parametrize("output", ["a[1].nc", "a[1].zarr"])
@@ -169,9 +171,15 @@ def test_a_run_goes_on_with_its_own_chunks_only(folder: Path, output: str, monke
 
 def test_another_motion_is_another_run(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     stored(job_of(folder, "suite"), folder / "a.nc")
-    write_motion(folder / "motions" / "m2.csv", 5, 60, 0.02)
+    (folder / "motions" / "m2.csv").rename(folder / "motions" / "m3.csv")
     with pytest.raises(InputError, match="another sweep or version"):
         stored(job_of(folder, "suite"), folder / "a.nc", resume=True)
+    write_motion((folder / "motions" / "m3.csv").rename(folder / "motions" / "m2.csv"), 5, 60, 0.02)
+    with pytest.raises(InputError, match="another sweep or version"):
+        stored(job_of(folder, "suite"), folder / "a.nc", resume=True)
+    step, sweep = (spec.load(folder / f"{name}.toml") for name in ("step", "sweep"))
+    assert sweep_job(step).digest != sweep_job(replace(step, solver=slipsweep.Step(steps_per_cycle=128))).digest
+    assert limit_job(sweep, [0.01], 8.0).digest != limit_job(sweep, [0.01], 9.0).digest
 
 
 def test_what_no_disk_and_no_memory_holds(folder: Path) -> None:

@@ -67,8 +67,3 @@ def test_flags_by_cf_xarray(result: xr.Dataset) -> None:
     for name, flag in result.validity.cf.flags.data_vars.items():
         np.testing.assert_array_equal(flag, own[name])
     assert "validity" in result.cf["permanent_displacement"].coords
-
-
-def test_pictures_by_hvplot(result: xr.Dataset) -> None:
-    pytest.importorskip("hvplot.xarray")
-    assert result.permanent_displacement.isel(theta=0).hvplot.line(x="amplitude", by="mu_s") is not None

@@ -62,34 +62,6 @@ def test_affinity_limits_threads() -> None:
     assert count_in_process(code=late) == 1
 
 
-# ------------------------------------------------------------------------------- spreading
-
-
-@pytest.mark.parametrize("count", [1, 3])
-def test_every_part_is_done_once(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(threads, "thread_count", lambda: count)
-    done: list[int] = []
-    threads.spread(range(1000), done.append)
-    assert sorted(done) == [*range(1000)]
-
-
-def test_an_error_ends_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(threads, "thread_count", lambda: 2)
-    calls: list[int] = []
-
-    def work(part: int) -> None:
-        calls.append(part)
-        time.sleep(0.005)
-        if part:
-            raise ZeroDivisionError(str(part))
-
-    before = threading.active_count()
-    with pytest.raises(ZeroDivisionError):
-        threads.spread(range(100), work)
-    assert len(calls) < 20
-    assert threading.active_count() == before
-
-
 # ------------------------------------------------------------------------------- who calls
 
 

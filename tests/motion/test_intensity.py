@@ -63,6 +63,12 @@ def test_straight_lines_by_hand() -> None:
     assert found["significant_duration"] == pytest.approx(3.0 - 0.15 ** (1 / 3) - (1.0 - 0.85 ** (1 / 3)), rel=1e-14)
 
 
+def test_the_mean_period_is_that_of_frequencies_up_to_20_hz() -> None:
+    times = np.arange(0.0, 20.0, 0.005)
+    waves = np.sin(2 * np.pi * 5 * times) + np.sin(2 * np.pi * 22 * times)
+    assert intensity.mean_period(times, waves) == pytest.approx(0.2, rel=1e-2)
+
+
 def test_a_constant_acceleration() -> None:
     """Where the cubic of the energy degenerates."""
     for last in (2.0, 2.0 + 1e-13, 2.0 + 1e-5):

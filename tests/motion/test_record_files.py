@@ -43,6 +43,7 @@ def write(folder: Path, name: str, text: str) -> Path:
     [
         ("0,0.1\n0.01,0.2\n", "g", 9.80665),
         ("time (s),acceleration (m/s2)\n0,0.1\n0.01,0.2\n", None, 1.0),
+        ("peak 0.35 (g)\ntime (s),acceleration (m/s2)\n0,0.1\n0.01,0.2\n", None, 1.0),
         ("# a comment\n# Time (s),Acceleration (g's)\n0;0.1\n0.01;0.2\n", None, 9.80665),
         ("t [s]\ta [cm/s^2]\n0\t0.1\n0.01\t0.2\n\n", None, 0.01),
         ("Zeit (s);Beschleunigung (g)\n0,00;0,1\n0,01;2,0e-1\n", None, 9.80665),

@@ -108,6 +108,8 @@ def test_a_slide_that_the_record_ends_in_has_no_stop(stick_slip: xr.Dataset) -> 
     found = friction(stick_slip.isel(time=slice(0, 170)))  # 0.845 s, in the first slide
     assert found.sizes["slide"] == 1
     assert math.isnan(found.slide_stop.item())
+    (span,) = found.slipsweep.chart("friction").axes[0].patches
+    assert span.get_x() + span.get_width() == found.time[-1]
 
 
 def test_the_threshold_is_reported(stick_slip: xr.Dataset) -> None:
@@ -134,6 +136,8 @@ def test_offset_and_drift_are_taken_off_where_named(stick_slip: xr.Dataset) -> N
     asked = friction(drifting, drift="block_acceleration", rest=(0.0, 0.495))
     np.testing.assert_allclose(asked.block_acceleration, stick_slip.block_acceleration, atol=1e-12)
     assert asked.attrs["removed"] == "block_acceleration: 0.4 m s-2 and 0.1 m s-2 a second"
+    late = friction(drifting.assign_coords(time=drifting.time + 10), drift="block_acceleration", rest=(10, 10.495))
+    np.testing.assert_allclose(late.block_acceleration, stick_slip.block_acceleration, atol=1e-12)
     unasked = friction(drifting)
     np.testing.assert_array_equal(unasked.block_acceleration, drifting.block_acceleration)
     assert unasked.attrs["removed"] == "nothing"

@@ -98,6 +98,9 @@ def test_gap_in_validity() -> None:
     assert limits.limit_amplitude[0].item() < edge
     assert limits.limit_amplitude[1].item() == np.nextafter(limit, np.inf)
     assert limits.limit_status[1].item() == LimitStatus.AFTER_GAP
+    limits = limit_amplitude([below * 0.5, below * 1.001], **choices(**given | {"frequency": [1.0, 2.0]}))
+    legend = [text.get_text() for text in limits.slipsweep.chart().legends[0].get_texts()]
+    assert "set by a discontinuity\nof the model" in legend
 
 
 def test_smallest_amplitude_of_a_dense_scan() -> None:

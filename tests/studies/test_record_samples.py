@@ -54,6 +54,12 @@ CASES: dict[str, tuple[dict[str, Any], dict[str, Any], Any]] = {
         {"scale": 3.0, "time_scale": [0.5, 2.0]},
         lambda d: {"mu_s": d["mu_s"], "time_scale": xr.DataArray([0.5, 2.0], dims="time_scale") * d["time_scale"]},
     ),
+    **{
+        f"{strength} over the time": (
+            {"mu_s": NORMAL}, {strength: [0.8, 2.0], "time_scale": [0.5, 2.0]}, lambda d: {"mu_s": d["mu_s"]},
+        )
+        for strength in ("pgv", "arias_intensity")
+    },
     "an offset to the time": (
         {"time_scale": {"distribution": "uniform", "loc": -0.2, "scale": 0.4, "kind": "offset"}},
         {"mu_s": 0.4, "scale": 3.0, "time_scale": [0.5, 2.0]},

@@ -63,6 +63,7 @@ def test_measures_are_coordinates() -> None:
         for name, value in intensity_measures(motion.times, motion.acceleration).items():
             assert float(found[f"motion_{name}"].sel(motion=f"noise{at + 1}")) == value
     assert found.motion_pgv.attrs["units"] == "m s-1"
+    assert found.motion_significant_duration.attrs["units"] == found.motion_mean_period.attrs["units"] == "s"
     assert (found.attrs["suite"], found.attrs["motions"]) == ("three", 3)
 
 

@@ -255,6 +255,12 @@ def test_bad_distributions(change: dict[str, Any], message: str) -> None:
         slipsweep.sample(**given, uncertain=change)
 
 
+def test_draws_are_checked_at_both_ends_of_an_axis() -> None:
+    offset = {"theta": {"distribution": "uniform", "scale": 20, "kind": "offset"}}
+    with pytest.raises(InputError, match="as offset on theta = 80"):
+        slipsweep.sample([0.0, 80.0], 0.4, 2.0, 1.0, uncertain=offset)
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

@@ -219,24 +219,10 @@ def solve(
     dps: int = 30,
     **given: Number | None,
 ) -> Solution:
-    """Response of one cell to a waveform.
+    """Response of one cell to a waveform, to `dps` digits; floats are taken at their exact binary value.
 
-    Parameters
-    ----------
-    theta, mu_s, amplitude, frequency, cycles, waveform, ramp_in, ramp_out, structure_frequency, model, rise, \
-recoupling, g
-        As in `slipsweep.sweep`.  Floats are taken at their exact binary value.
-    harmonics
-        "amplitude:multiple:phase in degrees, ...".
-    dps
-        Decimal digits of the result.
-    **given
-        As in `friction_parameters`.
-
-    Returns
-    -------
-    Solution
-        Displacement in m, velocity in m/s; NaN where `validity` says that there is no value.
+    Arguments are those of `slipsweep.sweep`; `harmonics` are "amplitude:multiple:phase in degrees, ...", `given` as in
+    `friction_parameters`.  Displacement is in m, velocity in m/s; NaN where `validity` says that there is no value.
     """
     with workdps(dps + GUARD_DIGITS):
         parameters = friction_parameters(theta, mu_s, amplitude, model=model, g=g, dps=dps, **given)
