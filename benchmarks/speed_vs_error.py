@@ -144,7 +144,7 @@ def draw(found: list[Point], path: Path) -> None:
             )  # fmt: skip
         axis.set(xscale="log", yscale="log", title=regime.replace("_", "–"), ylim=(3e-18, 30))
         axis.grid(which="major", alpha=0.3)
-    axes[0, 1].legend(fontsize="small", loc="center right")
+    axes[1, 1].legend(fontsize="small", loc="center right")
     figure.supxlabel("processor time a cell, s")
     figure.supylabel("relative error of the displacement")
     figure.suptitle("What an error costs (median, whisker to the 95th percentile): down and to the left is better")
