@@ -15,14 +15,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, bytes]:
     return path, prepared(path)
 
 
-#: Faults that meet every kind of output alike: one round.
-ALIKE = ("folder not writable", "damaged result", "worker killed")
-
-
-@pytest.mark.parametrize(
-    ("fault", "output"),
-    [(fault, output) for fault in FAULTS for output in (OUTPUTS[-1:] if fault in ALIKE else OUTPUTS)],
-)
+@pytest.mark.parametrize("output", OUTPUTS)
+@pytest.mark.parametrize("fault", FAULTS)
 def test_nothing_is_lost_but_the_chunk_in_work(folder: tuple[Path, bytes], fault: str, output: str) -> None:
     path, whole = folder
     FAULTS[fault](path, output, whole, random.Random(output))

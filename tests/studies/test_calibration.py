@@ -71,9 +71,9 @@ def test_noise_digitisation_and_cycles(clean: dict[str, xr.Dataset], mode: str) 
 
 @pytest.mark.parametrize("kind", ["eq4", "yield", "continuous"])
 def test_coverage(kind: str) -> None:
-    """Of 3 x 3 intervals at 95 % two or more miss in 7 % of all such draws; these seeds are fixed."""
+    """Of 3 x 4 intervals at 95 % three or more miss in 2 % of all such draws; these seeds are fixed."""
     missed = 0
-    for seed in range(3):
+    for seed in range(4):
         case, test = drawn(kind, seed)
         found = slipsweep.calibrate(
             sensed(test, ("white", "12 bits")[seed % 2], seed), case["theta"], case["mu_s"], cycles=False
@@ -81,7 +81,7 @@ def test_coverage(kind: str) -> None:
         for name in SOUGHT:
             low, high = found[f"{name}_interval"].values
             missed += not low <= case[name] <= high
-    assert missed <= 1
+    assert missed <= 2
 
 
 def test_two_branches_are_united_and_a_second_test_tells_them_apart(tmp_path: Path) -> None:

@@ -135,8 +135,10 @@ def hurt(folder: Path, output: str, whole: bytes, chance: random.Random, sign: s
     errors = process.finished(None)
     if sign == signal.SIGINT and process.process.exitcode:
         assert process.process.exitcode == 130, errors
-        kept = r"nothing written|\d+ of \d+ chunks are kept in .*: --resume goes on"
-        assert re.fullmatch(rf"slipsweep: interrupted; ({kept})\n", errors), errors
+        kept = any((folder / f"{output}.part").glob("*.chunk"))
+        said = r"\d+ of \d+ chunks are kept in .*: --resume goes on" if kept else "nothing written"
+        assert re.fullmatch(rf"slipsweep: interrupted; {said}\n", errors), errors
+        assert not kept or "--resume" in start(folder, "run", "a.toml", "-o", output, "-q").finished(2)
     complete_or_absent(folder, output, whole)
 
 
