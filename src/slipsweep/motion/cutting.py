@@ -28,9 +28,8 @@ TERMS = 22
 #: Points of a cycle closer than this, as parts of it, are one; so are values of w closer than the second.
 _SAME, _ROUNDING = 1e-12, 1e-15
 
-#: Intervals, for each period of the fastest harmonic, in which zeros and turns are looked for, the highest derivative
-#: whose zeros part them (between four turns lies one of them), and halvings of an interval until nothing is left of it.
-_INTERVALS, _HIGHEST, _HALVINGS = 12, 4, 54
+#: Intervals that are searched in each period of the fastest harmonic, and the highest derivative whose zeros part them.
+_INTERVALS, _HIGHEST = 12, 4
 
 # 80-bit numbers where the machine has them: coefficients then are right to the last digit
 _Extended = np.longdouble
@@ -75,12 +74,10 @@ def _sum_of_sines(amplitudes: Sequence[float], multiples: Sequence[int], phases:
     a /= np.abs(a).max()
 
     def derivative(u: Exact, order: int) -> Exact:
-        turns = np.mod(m * np.asarray(u, _Extended), 1) + p / 360 + _Extended(order) / 4
-        quarters = np.rint(4 * turns)  # sin 2πt is exact at every quarter
-        rest = (turns - quarters / 4) * _TWO_PI
-        quadrant = np.mod(quarters, 4)
-        sines = np.where(np.mod(quadrant, 2) == 0, np.sin(rest), np.cos(rest))
-        return np.asarray((a * m**order * np.where(quadrant < 2, sines, -sines)).sum(axis=0))
+        turns = m * np.asarray(u, _Extended) + p / 360 + _Extended(order) / 4
+        halves = np.rint(2 * turns)  # sin 2πt is exact at every quarter
+        sines = (1 - 2 * np.mod(halves, 2)) * np.sin((turns - halves / 2) * _TWO_PI)
+        return np.asarray((a * m**order * sines).sum(axis=0))
 
     return derivative
 
@@ -94,20 +91,25 @@ def _edges(low: float, high: float, fastest: int) -> Exact:
 def _sign_changes(derivative: Derivative, lowest: int, edges: Exact) -> list[Exact]:
     """Places between the edges where derivatives change sign, ascending, of the orders from the lowest on.
 
-    Bracketed, then bisected, the highest order first: between two places where the next derivative does so this one
-    is monotone, and passes 0 once at most.  Zeros that lie close together are told apart.
+    Bracketed, the highest order first: between two places where the next derivative does so this one is monotone, and
+    passes 0 once at most.  Then by Newton's iteration, guarded as that of `kernels.events`.
     """
     found: list[Exact] = []
     for order in range(_HIGHEST, lowest - 1, -1):
         below = derivative(edges, order) < 0
         at = np.flatnonzero(below[:-1] != below[1:])
         low, high = edges[at], edges[at + 1]
-        for _ in range(_HALVINGS if at.size else 0):
-            middle = 0.5 * (low + high)
-            same = (derivative(middle, order) < 0) == below[at]
-            low, high = np.where(same, middle, low), np.where(same, high, middle)
-        found.insert(0, np.asarray(high))
-        edges = np.sort(np.concatenate([edges, high]))
+        zero, last, before = 0.5 * (low + high), high - low, high - low
+        while (last > np.finfo(float).eps).any():
+            value, slope = (derivative(zero, one).astype(float) for one in (order, order + 1))
+            same = (value < 0) == below[at]
+            low, high = np.where(same, zero, low), np.where(same, high, zero)
+            new = zero - np.divide(value, 2.0 * math.pi * slope, out=np.full_like(value, np.inf), where=slope != 0)
+            safe = (low <= new) & (new <= high) & (2 * np.abs(new - zero) <= before)
+            new = np.where(safe, new, 0.5 * (low + high))
+            zero, last, before = new, np.abs(new - zero), last
+        found.insert(0, zero)
+        edges = np.sort(np.concatenate([edges, zero]))
     return found
 
 
@@ -162,11 +164,10 @@ def _monotone_pieces(derivative: Derivative, fastest: int, low: float, high: flo
 def wave_of(waveform: Waveform) -> Wave:
     """The table of pieces of a waveform."""
     *_, is_sine = _period(waveform.plain)
-    cycles, plain = waveform.cycles, _pieces(waveform.plain, 0)
-    _, _, first, last, _ = plain
+    _, _, first, last, _ = plain = _pieces(waveform.plain, 0)
     wraps = int(first[0] > 0.0 and last[-1] > 0.0)
     # an interval that runs over from one cycle to the next makes the first cycle differ from the others
-    lead = min(math.ceil(waveform.ramp_in) + wraps, cycles)
+    lead, cycles = min(math.ceil(waveform.ramp_in) + wraps, waveform.cycles), waveform.cycles
     # the last plain cycle stands apart, as another does not follow; where intervals run over, so does the one before
     tail = min(math.ceil(waveform.ramp_out) + 1 + wraps, cycles - lead)
     repeats = cycles - lead - tail

@@ -191,10 +191,9 @@ class Suite:
 
     def intensities(self, places: NDArray[np.int64], azimuths: Floats) -> dict[str, Floats]:
         """Intensity measures of the motions at some places, each at its azimuth; the arrays have one shape."""
-        both, shape = zip(places.flat, azimuths.flat, strict=True), azimuths.shape
-        records = [self.record(int(at), float(azimuth)) for at, azimuth in both]
-        cells = [intensity_measures(one.times, one.acceleration) for one in records]
-        return {f"motion_{name}": np.reshape([cell[name] for cell in cells], shape) for name in INTENSITY_MEASURES}
+        motions = [self.record(int(at), float(own)) for at, own in zip(places.flat, azimuths.flat, strict=True)]
+        found = [intensity_measures(one.times, one.acceleration) for one in motions]
+        return {f"motion_{m}": np.reshape([one[m] for one in found], azimuths.shape) for m in INTENSITY_MEASURES}
 
     def record(self, at: int, azimuth: float) -> Record:
         """The motion at a place, of a pair the component at an azimuth."""
