@@ -5,13 +5,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import scipy  # which loads `stats` when that is first used
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
-from scipy import stats
 
 from slipsweep.charts import solved, statistics, style
 from slipsweep.charts.sheet import Panel, Sheet, log_axis, log_ticks, plot_curve
@@ -206,7 +206,7 @@ def _draw_regression(sheet: Sheet, panel: Panel, xs: Floats, ys: Floats) -> None
     elif np.ptp(np.log(xs[slid])) < 1e-6:  # motions scaled to it
         panel.add_title("no regression: one value for all motions")
     else:
-        found: Any = stats.linregress(np.log(xs[slid]), np.log(ys[slid]))
+        found: Any = scipy.stats.linregress(np.log(xs[slid]), np.log(ys[slid]))
         scatter = found.stderr * np.std(np.log(xs[slid])) * np.sqrt(slid.sum())
         ends = np.geomspace(xs[slid].min(), xs[slid].max(), 50)
         line = np.exp(found.intercept) * ends**found.slope
