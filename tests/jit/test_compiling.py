@@ -76,7 +76,7 @@ def test_of_eight_processes_that_start_at_once_one_compiles_also_where_two_are_k
 
 def test_a_changed_equation_is_never_served_from_an_old_cache(tmp_path: Path) -> None:
     copy = tmp_path / "copy"
-    shutil.copytree(PACKAGE, copy / "slipsweep", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(PACKAGE, copy / "slipsweep")
     env = environment(tmp_path, PYTHONPATH=str(copy))
     assert run(PARAMETERS, env) == "4.431"
     equations = copy / "slipsweep" / "model" / "equations.py"
