@@ -33,8 +33,7 @@ def root_of(value_and_slope: Callable[[Any, float], tuple[float, float]]) -> Cal
         `where` is what f is a function of besides x, and `origin` what x is counted from: the
         root is within 1e-9 of its distance from there.
         """
-        width = abs(above - below)
-        last = before_last = width
+        width = last = before_last = abs(above - below)
         for _ in range(_MOST_STEPS):
             value, slope = value_and_slope(where, x)
             if math.isnan(value):

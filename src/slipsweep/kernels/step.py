@@ -37,6 +37,7 @@ from slipsweep.motion.pieces import Piece, Wave
 #: Rules by which steps are taken.
 RECTANGLE, TRAPEZOID, SIMPSON = 0, 1, 2
 #: How b goes on besides the ways of `block.rise`: held (Üg falls), and by Eq. 4 without a stop (continuous sliding).
+#: Callers say int(HELD): for a constant numba compiles all that takes it once more.
 HELD, FOLLOWED = 3, 4
 #: From its onset to the largest D a slide takes N/64 steps at least, N a cycle; no cut makes a step shorter than this.
 SHARE_OF_CYCLE, LEAST_STEP = 64.0, 1e-14
@@ -362,7 +363,7 @@ def pulse(
         if pieces[q].jumps and not rises:  # a step of no length: b as on a rise, or a slide begins here
             top = point_at(block, pieces[q], begin)
             if state.sliding:
-                _, state = slide(block, RECTANGLE, block.rise, top, top, top, state)
+                _, state = slide(block, int(RECTANGLE), block.rise, top, top, top, state)
             elif top.base >= block.yield_acceleration and top.rate > 0.0:
                 held = physics.starting_acceleration(block, top.base)
                 growth = excitation.offset_at(pieces[q], block.amplitude, held) - begin
@@ -371,7 +372,7 @@ def pulse(
             state = walk(block, pieces, steps, q, begin, pieces[q].finish, block.rise, state)
         elif state.sliding:
             validity = physics.KD_NOT_POSITIVE if state.held <= 0.0 else validity
-            state = walk(block, pieces, steps, q, begin, pieces[q].finish, HELD, state)
+            state = walk(block, pieces, steps, q, begin, pieces[q].finish, int(HELD), state)
     if state.sliding and state.held <= 0.0:
         return pulses.Pulse(0.0, math.nan, math.nan, 0.0, 0.0, physics.KD_NOT_POSITIVE)
     t5 = pieces[end - 1].end
@@ -383,7 +384,7 @@ def pulse(
         for q in range(end, min(next_p + 1, pieces.shape[0])):
             if state.sliding:
                 until = next_tau if q == next_p else pieces[q].finish
-                state = walk(block, pieces, steps, q, pieces[q].begin, until, HELD, state)
+                state = walk(block, pieces, steps, q, pieces[q].begin, until, int(HELD), state)
     velocity, displacement = state.velocity, state.displacement
     if state.sliding and (options.recoupling != physics.INTEGRATE or begins == math.inf):
         displacement += eq.attenuated_displacement(velocity, state.held, begins - t5)
@@ -397,7 +398,7 @@ def follow(block: Block, wave: Wave, steps: Steps, c: int, p: int, tau: float) -
     state = State(0.0, 0.0, 0.0, 0.0, 0.0, True, -math.inf, 0.0)
     for q in range(p, wave.cycle[c + 1]):
         begin = tau if q == p else wave.pieces[q].begin
-        state = walk(block, wave.pieces, steps, q, begin, wave.pieces[q].finish, FOLLOWED, state)
+        state = walk(block, wave.pieces, steps, q, begin, wave.pieces[q].finish, int(FOLLOWED), state)
     return Gain(state.velocity, state.displacement, state.peak)
 
 
