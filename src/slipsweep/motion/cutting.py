@@ -100,14 +100,14 @@ def _sign_changes(derivative: Derivative, lowest: int, edges: Exact) -> list[Exa
         at = np.flatnonzero(below[:-1] != below[1:])
         low, high = edges[at], edges[at + 1]
         zero, last, before = 0.5 * (low + high), high - low, high - low
-        while (last > np.finfo(float).eps).any():
+        while (moves := last > np.finfo(float).eps).any():
             value, slope = (derivative(zero, one).astype(float) for one in (order, order + 1))
             same = (value < 0) == below[at]
             low, high = np.where(same, zero, low), np.where(same, high, zero)
             new = zero - np.divide(value, 2.0 * math.pi * slope, out=np.full_like(value, np.inf), where=slope != 0)
             safe = (low <= new) & (new <= high) & (2 * np.abs(new - zero) <= before)
             new = np.where(safe, new, 0.5 * (low + high))
-            zero, last, before = new, np.abs(new - zero), last
+            zero, last, before = np.where(moves, new, zero), moves * np.abs(new - zero), last
         found.insert(0, zero)
         edges = np.sort(np.concatenate([edges, zero]))
     return found
