@@ -22,17 +22,13 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-def pytest_sessionfinish() -> None:
-    """At its end pytest collects garbage five times, for warnings of what is deleted: seconds, in all that was made."""
-    gc.freeze()
-
-
 @pytest.fixture(autouse=True, scope="session")
 def _no_power_cut() -> Iterator[None]:
     """Nothing waits for the disk, which alone takes minutes on a slow one; processes that tests start do wait."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(os, "fsync", lambda descriptor: None)
         yield
+    gc.freeze()  # pytest ends by collecting garbage five times, for warnings of what is deleted: seconds
 
 
 @pytest.fixture

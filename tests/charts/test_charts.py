@@ -120,6 +120,7 @@ def test_contours_lie_where_the_displacement_is_their_level(grid: xr.Dataset) ->
     figure = grid.slipsweep.chart("contours", at={"theta": 6, "mu_s": 0.45})
     drawn = named(figure, "contours")
     assert len(drawn) == 2  # below the mode limit and beyond it
+    assert all(len(segments[0]) for segments in drawn[0].allsegs)
     checked = 0
     for side in drawn:
         for level, segments in zip(side.levels, side.allsegs, strict=True):
@@ -233,7 +234,10 @@ def test_one_curve_has_newmarks_beside(grid: xr.Dataset, lined: xr.Dataset) -> N
         assert on_grid.sum() > 10
         (line,) = named(figure, "newmark")
         np.testing.assert_allclose(line.get_ydata(), np.where(theirs > 0, theirs, np.nan), rtol=1e-12)
-        assert "Newmark's block" in legend(figure)
+        lines = {"yield": "yield_line", "mode limit (Eq. 7)": "limit_line"} if x == "amplitude" else {}
+        assert {*legend(figure)} >= {"Newmark's block", *lines}
+        marks = [line.get_xdata()[0] for gid in lines.values() for line in named(figure, gid)]
+        assert marks == pytest.approx([3.2306287100, 7.9326887206] if lines else [])
 
 
 def test_newmarks_block_over_its_yield_coefficient(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

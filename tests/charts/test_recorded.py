@@ -329,9 +329,11 @@ def test_statistics_are_drawn_as_they_are() -> None:
     figure = found.slipsweep.chart("fragility", at={"frequency": "2000mHz"})
     for line, threshold in zip(figure.axes[0].lines, found.threshold, strict=True):
         np.testing.assert_array_equal(line.get_ydata(), at.exceedance_probability.sel(threshold=threshold))
+    assert figure.axes[0].get_ylim()[0] < 0.0 < 1.0 < figure.axes[0].get_ylim()[1]
     assert "uncertain: μs ~ lognorm(s=0.1, scale=0.4), A × lognorm(s=0.3)" in caption(figure)
     bands = found.slipsweep.chart("quantiles", at={"frequency": 2})
     (median,) = labelled(bands, "median")
+    assert legend(bands) == ["5 to 95 %", "median"]
     np.testing.assert_allclose(median.get_ydata(), at.displacement_quantile.sel(quantile=0.5) * 1000.0)
     lines = {line.get_label(): line for line in found.slipsweep.chart("sensitivity", at={"frequency": 2}).axes[0].lines}
     for symbol, name in (("A", "amplitude"), ("μs", "mu_s")):
@@ -339,9 +341,8 @@ def test_statistics_are_drawn_as_they_are() -> None:
     bars = found.slipsweep.chart("sensitivity", at={"frequency": 2, "amplitude": 6.0}).axes[0]
     order = [text.get_text() for text in bars.get_yticklabels()]
     totals = [patch.get_width() for patch in bars.patches][: len(order)]
-    point = at.sel(amplitude=6.0).total_index
     names = {"A": "amplitude", "μs": "mu_s"}
-    np.testing.assert_allclose(totals, [point.sel(input=names[symbol]).item() for symbol in order])
+    np.testing.assert_allclose(totals, [at.total_index.sel(amplitude=6.0, input=names[one]).item() for one in order])
     assert totals == sorted(totals)
     found.valueless_share[0] = 0.25
     assert "up to 25.0% of the samples" in caption(found.slipsweep.chart("quantiles", at={"frequency": 2}))

@@ -20,8 +20,6 @@ from slipsweep.explore.page import write_page
 from slipsweep.model.variables import CAUTIONS, FLAG_KIND_TEXT, VALUELESS, FlagKind, flags_of
 from tests.support.commands import command
 
-pytest.importorskip("bokeh", reason="the extra [explore] is not installed")
-
 #: Stuck, stick-slip, continuous, flagged and statically unstable cells.
 SWEEP = """
 axes.theta.values = [0, 5, 20]
@@ -89,6 +87,7 @@ def test_page_holds_the_dataset(result: Path, written: Path) -> None:
             np.testing.assert_array_equal(np.broadcast_to(arrays[name], expected[name].shape), expected[name])
         # single precision, and once more by the law of frequencies
         np.testing.assert_allclose(arrays["permanent_displacement"], expected.permanent_displacement, rtol=4e-7, atol=0)
+        lengths = expected[["permanent_displacement", "newmark_displacement"]].to_array() * 1000.0
     # u = W/ω²: stored at one frequency
     assert meta["arrays"]["permanent_displacement"]["shape"] == [3, 2, 23, 1]
     assert [dim["log"] for dim in meta["dims"]] == [False, False, False, True]
@@ -96,6 +95,8 @@ def test_page_holds_the_dataset(result: Path, written: Path) -> None:
     assert '"excitation frequency f (Hz), logarithmic scale"' in text
     assert '"peak ground acceleration A (m/s²)"' in text
     assert '[10.0, "10 mm"]' in text  # of the bar of colours
+    low, high = np.nanpercentile(np.log10(lengths.where(lengths > 0)), (5, 95))  # nine cells in ten
+    assert f"those beyond {10 ** math.floor(low):g} and {10 ** math.ceil(high):g} mm have" in written.read_text()
     assert meta["unsound"] == int(CAUTIONS | VALUELESS)
     assert "All 2,484 cells of the file are in this page." in written.read_text()
 

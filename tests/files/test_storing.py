@@ -217,7 +217,6 @@ def test_memory_is_what_is_asked_for(folder: Path, output: str) -> None:
 
 @pytest.mark.parametrize("output", ["w.nc", "w.zarr"])
 def test_workers_give_the_same_bits(folder: Path, output: str) -> None:
-    pytest.importorskip("distributed")
     stored(job_of(folder, "sweep"), folder / "a.nc")
     stored(job_of(folder, "sweep"), folder / output, workers=1)
     xr.testing.assert_identical(without_time(read_result(folder / output)), without_time(read_result(folder / "a.nc")))

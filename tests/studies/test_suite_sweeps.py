@@ -117,13 +117,12 @@ def test_info_and_export_show_the_motions(folder: Path) -> None:
     done = command(folder, "run", "a.toml")
     assert "the same motion under several labels: m0, m4" in done.stdout
     lines = command(folder, "info", "a.nc").stdout.splitlines()
-    at = lines.index("motions, as recorded:")
-    assert lines[at + 1].split()[:3] == ["motion", "samples", "interval"]
-    assert [line.split()[:3] for line in lines[at + 2 : at + 5]] == [
-        ["m0", "150", "0.01"], ["m1", "80", "0.02"], ["m2", "200", "0.005"],
+    assert [line.split()[:3] for line in lines[lines.index("motions, as recorded:") + 1 :][:4]] == [
+        ["motion", "samples", "interval"], ["m0", "150", "0.01"], ["m1", "80", "0.02"], ["m2", "200", "0.005"],
     ]  # fmt: skip
     one = command(folder, "info", "a.nc", "--at", "polarity=1", "-d", "5cm")
     assert "permanent displacement (mm) over 4 motion x 1 polarity:" in one.stdout
+    assert "median" in one.stdout.split()
     (folder / "b.toml").write_text(SAMPLES.replace("[uncertainty]", "[uncertainty]\nover = 'motion'"))
     assert command(folder, "run", "b.toml", "--quiet").returncode == 0
     with xr.open_dataset(folder / "b.nc") as samples:

@@ -88,9 +88,7 @@ class Excerpt:
     def is_log(self, dim: str) -> bool:
         """Whether an axis is drawn by factors: the frequency, and others that are spread so."""
         values = axis_numbers(self.table, dim)
-        if values.size < 2 or values[0] <= 0.0 or dim in self.labels:
-            return False
-        return dim == "frequency" or is_log(values)
+        return (dim == "frequency" and values.size > 1) or is_log(values)
 
 
 def read_excerpt(path: Path, cells: int) -> Excerpt:
