@@ -84,7 +84,7 @@ def without_time(table: xr.Dataset) -> xr.Dataset:
 def test_every_study_runs_every_way(folder: Path, study: str, output: str, monkeypatch: pytest.MonkeyPatch) -> None:
     job = job_of(folder, study)
     whole = stored(job, folder / "a.nc")
-    monkeypatch.setattr(running, "CHUNK_CELLS", int(5 * job.plan.cost) + 1)
+    monkeypatch.setattr(running, "CHUNK_CELLS", int(8 * job.plan.cost) + 1)
     parts = stored(job_of(folder, study), folder / output)
     one, other = read_result(folder / "a.nc"), read_result(folder / output)
     xr.testing.assert_identical(without_time(other), without_time(one))
