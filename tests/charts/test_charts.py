@@ -237,7 +237,7 @@ def test_one_curve_has_newmarks_beside(grid: xr.Dataset, lined: xr.Dataset) -> N
         lines = {"yield": "yield_line", "mode limit (Eq. 7)": "limit_line"} if x == "amplitude" else {}
         assert {*legend(figure)} >= {"Newmark's block", *lines}
         marks = [line.get_xdata()[0] for gid in lines.values() for line in named(figure, gid)]
-        assert marks == pytest.approx([3.2306287100, 7.9326887206] if lines else [])
+        assert marks == pytest.approx([3.2306287100, 7.9326887206] if lines else [])  # g tan(φ − θ), Eq. 7
 
 
 def test_newmarks_block_over_its_yield_coefficient(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

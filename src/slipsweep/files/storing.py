@@ -258,7 +258,7 @@ class ZarrChunks(Chunks):
 def _write_region(solve: Callable[[], xr.Dataset], chunk: Chunk, store: str, place: str, number: int) -> None:
     """Compute a chunk and write it to its region of a Zarr store, then its mark."""
     results = solve()
-    whole = [name for name, one in results.items() if chunk.keys().isdisjoint(one.dims)]
+    whole = [name for name, one in results.items() if chunk.keys().isdisjoint(one.dims)]  # no region
     for part in filter(None, (results.drop_vars(whole), results[whole])):
         region: Any = {dim: chunk[str(dim)] for dim in part.dims if dim in chunk} or None
         part.to_zarr(store, mode="r+", region=region, zarr_format=3, consolidated=False)

@@ -163,11 +163,11 @@ def _monotone_pieces(derivative: Derivative, fastest: int, low: float, high: flo
 @functools.lru_cache(maxsize=32)
 def wave_of(waveform: Waveform) -> Wave:
     """The table of pieces of a waveform."""
-    *_, is_sine = _period(waveform.plain)
+    cycles, (*_, is_sine) = waveform.cycles, _period(waveform.plain)
     _, _, first, last, _ = plain = _pieces(waveform.plain, 0)
     wraps = int(first[0] > 0.0 and last[-1] > 0.0)
     # an interval that runs over from one cycle to the next makes the first cycle differ from the others
-    lead, cycles = min(math.ceil(waveform.ramp_in) + wraps, waveform.cycles), waveform.cycles
+    lead = min(math.ceil(waveform.ramp_in) + wraps, cycles)
     # the last plain cycle stands apart, as another does not follow; where intervals run over, so does the one before
     tail = min(math.ceil(waveform.ramp_out) + 1 + wraps, cycles - lead)
     repeats = cycles - lead - tail
