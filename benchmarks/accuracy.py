@@ -28,19 +28,30 @@ def cycle_errors(found: list[Point]) -> str:
     rows = []
     for point in found:
         if point.solver == "cycle":
-            errors = (number(one, 2) for one in (point.median_error, point.error_95, point.worst_error))
-            rows.append([point.regime.replace("_", "–"), *errors, number(point.seconds_per_cell * 1e9)])
+            errors = (
+                number(one, 2) for one in (point.median_error, point.error_95, point.worst_error)
+            )
+            rows.append(
+                [point.regime.replace("_", "–"), *errors, number(point.seconds_per_cell * 1e9)]
+            )
     return table(["regime", "median", "95 %", "worst", "ns a cell and core"], rows)
 
 
 def newmark() -> str:
     """Newmark's block in closed form, and the error of the cycle solver under each wave and a rectangular pulse."""
-    waves = {"square": slipsweep.Square(1), "sine": slipsweep.Sine(1), "triangle": slipsweep.Triangle(1)}
+    waves = {
+        "square": slipsweep.Square(1),
+        "sine": slipsweep.Sine(1),
+        "triangle": slipsweep.Triangle(1),
+    }
     pulse = slipsweep.Record(np.array([0.0, 1.0]), np.array([G, G]))
     rows = []
     for r in (0.02, 0.1, 0.2, 0.5, 0.8, 0.95):
         block: dict[str, Any] = {"yield_coefficient": r, "model": slipsweep.Newmark(g=G)}
-        found = {name: slipsweep.sweep(**block, amplitude=G, frequency=1.0, excitation=w) for name, w in waves.items()}
+        found = {
+            name: slipsweep.sweep(**block, amplitude=G, frequency=1.0, excitation=w)
+            for name, w in waves.items()
+        }
         found["rectangle"] = slipsweep.sweep(**block, excitation=pulse)
         row = [f"{r:g}"]
         for name in ("rectangle", *waves):
@@ -49,7 +60,9 @@ def newmark() -> str:
             row += [f"{exact:.6g}", number(error, 1)]
         rows.append(row)
     names = ("pulse", "square", "sine", "triangle")
-    return table(["Üy/A", *(f"{name}{what}" for name in names for what in (": u/(A T²)", ", error"))], rows)
+    return table(
+        ["Üy/A", *(f"{name}{what}" for name in names for what in (": u/(A T²)", ", error"))], rows
+    )
 
 
 def main() -> None:

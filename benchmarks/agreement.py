@@ -1,9 +1,10 @@
 """The solvers held to each other: ``python -m benchmarks.agreement`` writes agreement.md.
 
-Draws cells as tests/support/agreement.py does, under all options and waveforms, and solves each in every way
-that there is; records as tests/support/made_up_records.py does; and many more cells under plain waves, in batches and
-from event to event, as tests/support/sine_cells.py does.  ``.ci/include-report`` puts the table into
-docs/waveforms.md.  Nothing is timed; it ends with an error where two ways disagree.
+Draws cells as tests/support/agreement.py does, under all options and waveforms, and solves each in
+every way that there is; records as tests/support/made_up_records.py does; and many more cells under
+plain waves, in batches and from event to event, as tests/support/sine_cells.py does.
+``.ci/include-report`` puts the table into docs/waveforms.md.  Nothing is timed; it ends with an
+error where two ways disagree.
 """
 
 import random
@@ -18,7 +19,10 @@ from tests.support.made_up_records import SEEN, difference, made
 from tests.support.sine_cells import drawn, times_bound
 
 #: Cells drawn, and in a group; and for each group made-up records, and cells under a plain wave.
-CELLS, SIZE, RECORDS, PLAIN = 10_000, 32, 4, 5_000
+CELLS = 10_000
+SIZE = 32
+RECORDS = 4
+PLAIN = 5_000
 
 #: What the made-up records are held to.
 BY_RECORD = "reference under a record"
@@ -40,10 +44,24 @@ def compare_records(seed: int) -> Iterator[Comparison]:
     """The comparisons of some made-up records."""
     for one in range(seed, seed + RECORDS):
         found = difference(made(one))
-        yield Comparison(BY_RECORD, "record", 1, found, found / SEEN, f"tests.support.made_up_records.made({one})")
+        yield Comparison(
+            BY_RECORD,
+            "record",
+            1,
+            found,
+            found / SEEN,
+            f"tests.support.made_up_records.made({one})",
+        )
 
 
-HEADER = ["the cycle solver against", "cells", "agreed", "median difference", "largest", "largest over its bound"]
+HEADER = [
+    "the cycle solver against",
+    "cells",
+    "agreed",
+    "median difference",
+    "largest",
+    "largest over its bound",
+]
 
 
 def main() -> None:
@@ -78,7 +96,10 @@ def main() -> None:
         if first % (50 * SIZE) == 0:
             print(f"{first} cells, {len(wrong)} disagreements", flush=True)
     by_kind = table(HEADER, rows_of({kind: found for kind, found in kinds.items() if found}))
-    by_regime = table([HEADER[0].replace("the cycle", "the step"), *HEADER[1:]], rows_of(dict(sorted(regimes.items()))))
+    by_regime = table(
+        [HEADER[0].replace("the cycle", "the step"), *HEADER[1:]],
+        rows_of(dict(sorted(regimes.items()))),
+    )
     print(by_kind, by_regime, sep="\n")
     head = (
         f"{cells:,} cells, {modes[0]:,} of them stuck, {modes[1]:,} in stick–slip, {modes[2]:,} in continuous sliding, "

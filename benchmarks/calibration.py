@@ -1,8 +1,9 @@
 """Calibration on synthetic tests: how often the 95 % intervals hold the true parameters.
 
-The model itself is the truth: θ, μs, Üy, λ, Δμ, amplitude and frequency are drawn widely, in tests where Eq. 4 acts,
-where the yield acceleration governs, and of continuous sliding; with white noise of 1 % of each channel's peak, the
-table's among them, or a converter of 12 bits and no other noise.  Writes calibration.md.
+The model itself is the truth: θ, μs, Üy, λ, Δμ, amplitude and frequency are drawn widely, in tests
+where Eq. 4 acts, where the yield acceleration governs, and of continuous sliding; with white noise
+of 1 % of each channel's peak, the table's among them, or a converter of 12 bits and no other noise.
+Writes calibration.md.
 """
 
 import multiprocessing
@@ -23,7 +24,8 @@ KINDS = {"eq4": "Eq. 4 acts", "yield": "yield governs", "continuous": "continuou
 
 NOISES = ("white", "12 bits")
 
-CYCLES, RATE = 6, 200
+CYCLES = 6
+RATE = 200
 
 _NO_TEST = Validity.UPLIFT | Validity.LIMIT_UNDEFINED | Validity.STATICALLY_UNSTABLE
 
@@ -32,8 +34,10 @@ def drawn(kind: str, seed: int) -> tuple[dict[str, float], xr.Dataset]:
     """Parameters of one test of a kind, and what its channels would be without sensors."""
     generator = np.random.default_rng([list(KINDS).index(kind), seed])
     while True:
-        theta, mu_s = generator.uniform(0.0, 14.0), generator.uniform(0.2, 0.6)
-        amplitude, ratio = generator.uniform(1.5, 9.0), np.exp(generator.uniform(np.log(1.2), np.log(5.0)))
+        theta = generator.uniform(0.0, 14.0)
+        mu_s = generator.uniform(0.2, 0.6)
+        amplitude = generator.uniform(1.5, 9.0)
+        ratio = np.exp(generator.uniform(np.log(1.2), np.log(5.0)))
         case = {
             "theta": theta,
             "mu_s": mu_s,
@@ -47,29 +51,43 @@ def drawn(kind: str, seed: int) -> tuple[dict[str, float], xr.Dataset]:
         if mu_s <= 1.2 * np.tan(np.radians(theta)):
             continue
         result = slipsweep.sweep(**case, excitation=shaking)
-        flags, mode = Validity(int(result.validity)), int(result.sliding_mode)
+        flags = Validity(int(result.validity))
+        mode = int(result.sliding_mode)
         found = "continuous" if mode == 2 else "yield" if flags & Validity.YIELD_GOVERNS else "eq4"
-        if mode < 1 or found != kind or flags & _NO_TEST or abs(float(result.permanent_displacement)) < 1e-4:
+        if (
+            mode < 1
+            or found != kind
+            or flags & _NO_TEST
+            or abs(float(result.permanent_displacement)) < 1e-4
+        ):
             continue
         # `simulate` does not stop a block that slides continuously as the shaking ends
         tail = 0.0 if kind == "continuous" else 0.6
         times = np.arange(0.0, CYCLES / case["frequency"] + tail, 1.0 / RATE)
         history = slipsweep.simulate(**case, excitation=shaking, times=times)
         rest = np.zeros(int(generator.choice([0, RATE // 2])))
-        channels = {name: ("time", np.concatenate([rest, history[name].values])) for name in CHANNELS}
+        channels = {
+            name: ("time", np.concatenate([rest, history[name].values])) for name in CHANNELS
+        }
         return case, xr.Dataset(channels, {"time": np.arange(times.size + rest.size) / RATE})
 
 
 def sensed(test: xr.Dataset, noise: str, seed: int) -> xr.Dataset:
     """A test as its sensors give it."""
-    return measured(test, seed, 0.01, bits=None) if noise == "white" else measured(test, seed, 0.0, bits=12)
+    return (
+        measured(test, seed, 0.01, bits=None)
+        if noise == "white"
+        else measured(test, seed, 0.0, bits=12)
+    )
 
 
 def one(task: tuple[str, str, int]) -> list[tuple[bool, bool]]:
     """Of each parameter, whether the interval holds the true value, and whether it is bounded."""
     kind, noise, seed = task
     case, test = drawn(kind, seed)
-    found = slipsweep.calibrate(sensed(test, noise, seed), case["theta"], case["mu_s"], cycles=False)
+    found = slipsweep.calibrate(
+        sensed(test, noise, seed), case["theta"], case["mu_s"], cycles=False
+    )
     ends = [found[f"{name}_interval"].values for name in SOUGHT]
     return [
         (bool(low <= case[name] <= high), bool(np.isfinite(high) and low > 0.0))
@@ -82,7 +100,10 @@ def report(results: dict[tuple[str, str], np.ndarray]) -> str:
     rows: list[list[Any]] = []
     for (kind, noise), found in results.items():
         held, bounded = found.mean(axis=0).T
-        shares = [f"{100 * share:.1f} % ({100 * known:.0f} %)" for share, known in zip(held, bounded, strict=True)]
+        shares = [
+            f"{100 * share:.1f} % ({100 * known:.0f} %)"
+            for share, known in zip(held, bounded, strict=True)
+        ]
         rows.append([KINDS[kind], noise, len(found), *shares])
     return (
         f"{measured_on(('numpy', 'scipy', 'numba'), timed=False)}\n\n"
@@ -110,7 +131,9 @@ def main() -> None:
         with ProcessPoolExecutor(cores(), multiprocessing.get_context("spawn")) as pool:
             found = list(pool.map(one, tasks, chunksize=4))
     results = {
-        kind: np.array([result for task, result in zip(tasks, found, strict=True) if task[:2] == kind])
+        kind: np.array(
+            [result for task, result in zip(tasks, found, strict=True) if task[:2] == kind]
+        )
         for kind in kinds
     }
     (given.folder / "calibration.md").write_text(report(results), encoding="utf-8")

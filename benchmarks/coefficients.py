@@ -2,9 +2,10 @@
 
     python -m benchmarks.coefficients
 
-Each function, divided by the power of its argument with which it begins, is interpolated at Chebyshev nodes, in 60
-digits; the coefficients are rounded to doubles.  They are printed lowest power first, as they stand in the source, and
-the error of the polynomial with rounded coefficients, relative to the function.
+Each function, divided by the power of its argument with which it begins, is interpolated at
+Chebyshev nodes, in 60 digits; the coefficients are rounded to doubles.  They are printed lowest
+power first, as they stand in the source, and the error of the polynomial with rounded coefficients,
+relative to the function.
 """
 
 from collections.abc import Callable
@@ -30,19 +31,28 @@ class Approximation:
     def coefficients(self) -> list[float]:
         """Those of the polynomial through the values at the nodes, lowest power first."""
         with mpmath.workdps(DIGITS):
-            start, end = mpmath.mpf(self.start), mpmath.mpf(self.end)
+            start = mpmath.mpf(self.start)
+            end = mpmath.mpf(self.end)
             angles = [(2 * k + 1) * mpmath.pi / (2 * self.nodes) for k in range(self.nodes)]
             places = [(start + end) / 2 + (end - start) / 2 * mpmath.cos(angle) for angle in angles]
-            powers = mpmath.matrix([[place**power for power in range(self.nodes)] for place in places])
-            found = mpmath.lu_solve(powers, mpmath.matrix([self.function(place) for place in places]))
+            powers = mpmath.matrix(
+                [[place**power for power in range(self.nodes)] for place in places]
+            )
+            found = mpmath.lu_solve(
+                powers, mpmath.matrix([self.function(place) for place in places])
+            )
             return [float(one) for one in found]
 
     def error(self, coefficients: list[float]) -> float:
         """Largest error relative to the function."""
         with mpmath.workdps(DIGITS):
-            start, end = mpmath.mpf(self.start), mpmath.mpf(self.end)
+            start = mpmath.mpf(self.start)
+            end = mpmath.mpf(self.end)
             places = [start + (end - start) * (2 * k + 1) / (2 * POINTS) for k in range(POINTS)]
-            return max(float(abs(mpmath.polyval(coefficients[::-1], z) / self.function(z) - 1)) for z in places)
+            return max(
+                float(abs(mpmath.polyval(coefficients[::-1], z) / self.function(z) - 1))
+                for z in places
+            )
 
 
 def _after(power: int, function: Callable[[Any], Any]) -> Callable[[Any], Any]:
@@ -60,7 +70,9 @@ APPROXIMATIONS = {
     "exp": Approximation(lambda r: (mpmath.exp(r) - 1 - r) / r**2, -_HALF_LN2, _HALF_LN2, 10),
     "versine": Approximation(_after(2, lambda x: 1 - mpmath.cos(x)), 0, _QUARTER, 9),
     "angle_minus_sine": Approximation(_after(3, lambda x: x - mpmath.sin(x)), 0, _QUARTER, 9),
-    "half_square_minus_versine": Approximation(_after(4, lambda x: x**2 / 2 - 1 + mpmath.cos(x)), 0, _QUARTER, 9),
+    "half_square_minus_versine": Approximation(
+        _after(4, lambda x: x**2 / 2 - 1 + mpmath.cos(x)), 0, _QUARTER, 9
+    ),
     "inverse_versine": Approximation(_after(1, mpmath.asin), 0, 0.5, 20),
 }
 

@@ -1,7 +1,8 @@
 """Programs that solve differential equations, and pySLAMMER, on cells of `benchmarks.sample`: for speed_vs_error.
 
-One cycle of a sine: Newmark's block, and the paper's law in stick–slip.  General solvers are given the rate of the
-relative velocity, the phases at which it has a kink, and the event that the block stops.
+One cycle of a sine: Newmark's block, and the paper's law in stick–slip.  General solvers are given
+the rate of the relative velocity, the phases at which it has a kink, and the event that the block
+stops.
 """
 
 import itertools
@@ -18,17 +19,21 @@ from benchmarks.grids import G
 from benchmarks.sample import Group
 
 #: Phases at which the rate has a kink, and one at which every block has stopped.
-PEAK, ZERO, END = 0.5 * np.pi, np.pi, 40.0 * np.pi
+PEAK = 0.5 * np.pi
+ZERO = np.pi
+END = 40.0 * np.pi
 
 
 def rate_by(xp: Any) -> Callable[[Any, Any], Any]:
     """dV/dφ of a block that slides, in units of A, as a function of the phase and a cell, by NumPy or jax.numpy.
 
-    b = max(Üy, Eq. 4) up to the peak of Üg, held beyond it; Eq. 12 from Üg = 0 on.  Newmark's block has b = Üy.
+    b = max(Üy, Eq. 4) up to the peak of Üg, held beyond it; Eq. 12 from Üg = 0 on.  Newmark's block
+    has b = Üy.
     """
 
     def rate(phase: Any, cell: Any) -> Any:
-        base, law = cell[0] * xp.sin(phase), cell[6] > 0.0
+        base = cell[0] * xp.sin(phase)
+        law = cell[6] > 0.0
         x = xp.where(phase < PEAK, base, cell[0])
         friction = cell[4] * xp.exp(-cell[5] * x / G)
         eq4 = x - G * (cell[2] - friction) - x * cell[3] * (cell[2] - cell[3] - friction)
@@ -40,11 +45,17 @@ def rate_by(xp: Any) -> Callable[[Any, Any], Any]:
 
 def cells_of(group: Group) -> Any:
     """What `rate_by` takes of each cell: A, Üy, μs, tan θ, μs + Δμ, λ, and 1 for the law."""
-    theta, mu_s, amplitude = (xr.DataArray(group.inputs[name], dims="cell") for name in ("theta", "mu_s", "amplitude"))
+    theta, mu_s, amplitude = (
+        xr.DataArray(group.inputs[name], dims="cell") for name in ("theta", "mu_s", "amplitude")
+    )
     found = slipsweep.friction_parameters(theta, mu_s, amplitude)
-    onset, most, decay = found.yield_acceleration, mu_s + found.delta_mu, found.decay_rate
+    onset = found.yield_acceleration
+    most = mu_s + found.delta_mu
+    decay = found.decay_rate
     law = xr.full_like(mu_s, group.model == "mendez", float)
-    return np.nan_to_num(np.stack([amplitude, onset, mu_s, np.tan(np.radians(theta)), most, decay, law], axis=1))
+    return np.nan_to_num(
+        np.stack([amplitude, onset, mu_s, np.tan(np.radians(theta)), most, decay, law], axis=1)
+    )
 
 
 def begin_at_yield(group: Group) -> Group:
@@ -83,9 +94,18 @@ def _diffrax(tolerance: float) -> Any:
 
     def solve(cell: Any) -> Any:
         found = diffrax.diffeqsolve(
-            term, diffrax.Dopri8(), jnp.arcsin(cell[1] / cell[0]), END, 1e-2, jnp.zeros(2), cell,
-            stepsize_controller=steps, event=stop, max_steps=100_000, throw=False,
-        )  # fmt: skip
+            term,
+            diffrax.Dopri8(),
+            jnp.arcsin(cell[1] / cell[0]),
+            END,
+            1e-2,
+            jnp.zeros(2),
+            cell,
+            stepsize_controller=steps,
+            event=stop,
+            max_steps=100_000,
+            throw=False,
+        )
         return found.ys[0, 1]
 
     return jax.jit(jax.vmap(solve))
@@ -109,11 +129,19 @@ def _one_by_one(group: Group, solve_ivp: Any, tolerance: float) -> Any:
     derivatives, stop = _compiled()
     found = []
     for cell in cells_of(group):
-        y, ends = np.zeros(2), [float(np.arcsin(cell[1] / cell[0])), PEAK, ZERO, END]
+        y = np.zeros(2)
+        ends = [float(np.arcsin(cell[1] / cell[0])), PEAK, ZERO, END]
         for begin, end in itertools.pairwise(ends):
             events = stop if begin >= PEAK else None
             run = solve_ivp(
-                derivatives, (begin, end), y, "DOP853", args=(cell,), events=events, rtol=tolerance, atol=tolerance
+                derivatives,
+                (begin, end),
+                y,
+                "DOP853",
+                args=(cell,),
+                events=events,
+                rtol=tolerance,
+                atol=tolerance,
             )
             y = np.array(run.y[:, -1])
             if events and len(run.t_events[0]):
@@ -147,12 +175,19 @@ def by_pyslammer(group: Group, steps: int) -> Any:
 
     sine = np.sin(2.0 * np.pi * np.arange(steps + 1) / steps)
     cells = cells_of(group)
-    runs = [RigidAnalysis(cell[1] / G_EARTH, GroundMotion(sine * cell[0] / G_EARTH, 1.0 / steps)) for cell in cells]
+    runs = [
+        RigidAnalysis(cell[1] / G_EARTH, GroundMotion(sine * cell[0] / G_EARTH, 1.0 / steps))
+        for cell in cells
+    ]
     return np.array([run.max_sliding_disp for run in runs]) / group.inputs["frequency"] ** 2
 
 
 def _unscaled(group: Group, found: Any) -> Any:
-    return np.asarray(found) * group.inputs["amplitude"] / (2.0 * np.pi * group.inputs["frequency"]) ** 2
+    return (
+        np.asarray(found)
+        * group.inputs["amplitude"]
+        / (2.0 * np.pi * group.inputs["frequency"]) ** 2
+    )
 
 
 @dataclass(frozen=True)
@@ -172,5 +207,7 @@ PROGRAMS = {
     "diffrax": Program(by_diffrax, "s", "#31a354", cells=100_000),
     "CyRK": Program(by_cyrk, "D", "#756bb1"),
     "scipy": Program(by_scipy, "^", "#e6550d"),
-    "pyslammer": Program(by_pyslammer, "v", "#636363", tuple(2**k for k in range(6, 14)), regimes=("newmark",)),
+    "pyslammer": Program(
+        by_pyslammer, "v", "#636363", tuple(2**k for k in range(6, 14)), regimes=("newmark",)
+    ),
 }

@@ -24,7 +24,10 @@ def main() -> None:
                 tried(folder, OUTPUTS[number % 2], whole, random.Random(number))
                 print(number + 1, fault, flush=True)
             done = number + 1
-            texts = {fault: getattr(tried, "func", tried).__doc__ or "" for fault, tried in FAULTS.items()}
+            texts = {
+                fault: getattr(tried, "func", tried).__doc__ or ""
+                for fault, tried in FAULTS.items()
+            }
             rows = [[fault, " ".join(text.split()), done, done] for fault, text in texts.items()]
             text = f"{machine.measured_on(('netCDF4', 'zarr', 'distributed'))}\n\n"
             text += machine.table(["fault", "what it is", "tried", "survived"], rows)

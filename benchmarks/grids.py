@@ -11,7 +11,12 @@ from slipsweep.model.options import Rule
 G = 9.81
 
 #: Regimes, and the options that go with them.
-REGIMES: dict[str, dict[str, Any]] = {"stuck": {}, "stick_slip": {}, "continuous": {}, "newmark": {"model": "newmark"}}
+REGIMES: dict[str, dict[str, Any]] = {
+    "stuck": {},
+    "stick_slip": {},
+    "continuous": {},
+    "newmark": {"model": "newmark"},
+}
 
 #: The rules of the stepping solver.
 RULES: tuple[Rule, ...] = ("rectangle", "trapezoid", "simpson")
@@ -29,7 +34,9 @@ BOXES = {
 
 
 def _axes(ranges: tuple[tuple[float, float], ...], *sizes: int) -> dict[str, Any]:
-    theta, mu_s, amplitude = (np.linspace(*ends, size) for ends, size in zip(ranges, sizes, strict=True))
+    theta, mu_s, amplitude = (
+        np.linspace(*ends, size) for ends, size in zip(ranges, sizes, strict=True)
+    )
     return {"theta": theta, "mu_s": mu_s, "amplitude": amplitude * G, "frequency": 1.0}
 
 

@@ -28,23 +28,43 @@ def row_of(number_of_case: int, category: str, cell: dict[str, Any]) -> dict[str
 
 def write_cases() -> None:
     """Solve every cell and its neighbours, and write hard_cases.csv."""
-    names, cells = zip(*((category.__name__, cell) for category in CATEGORIES for cell in category()), strict=True)
+    names, cells = zip(
+        *((category.__name__, cell) for category in CATEGORIES for cell in category()), strict=True
+    )
     with ProcessPoolExecutor(cores()) as pool:
         rows = list(pool.map(row_of, range(len(cells)), names, cells))
     columns = [
-        *("case", "category", "model", "rise", "recoupling", *PARAMETERS, "cycles", "g", *OPTIONAL_INPUTS),
-        *("permanent_displacement", "displacement_bound", "peak_relative_velocity", "velocity_bound"),
+        *(
+            "case",
+            "category",
+            "model",
+            "rise",
+            "recoupling",
+            *PARAMETERS,
+            "cycles",
+            "g",
+            *OPTIONAL_INPUTS,
+        ),
+        *(
+            "permanent_displacement",
+            "displacement_bound",
+            "peak_relative_velocity",
+            "velocity_bound",
+        ),
         *("sliding_mode", "validity", "outcomes"),
     ]
     with (DATA / "hard_cases.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, columns, lineterminator="\n", extrasaction="ignore", restval="")
+        writer = csv.DictWriter(
+            file, columns, lineterminator="\n", extrasaction="ignore", restval=""
+        )
         writer.writeheader()
         writer.writerows(rows)
 
 
 def span(values: list[float]) -> str:
     """Least to greatest."""
-    low, high = number(min(values), 2), number(max(values), 2)
+    low = number(min(values), 2)
+    high = number(max(values), 2)
     return low if low == high else f"{low} – {high}"
 
 
@@ -55,12 +75,20 @@ def errors_table(cases: list[Case], answers: dict[str, dict[int, Found]]) -> str
         own = [case for case in cases if case.category == name]
         moving = [case for case in own if float(case.permanent_displacement or "0")]
         row = [name.replace("_", " "), len(own)]
-        relative = [float(mpf(case.displacement_bound) / abs(mpf(case.permanent_displacement))) for case in moving]
+        relative = [
+            float(mpf(case.displacement_bound) / abs(mpf(case.permanent_displacement)))
+            for case in moving
+        ]
         row.append(span(relative) if relative else "at rest")
         for found in answers.values():
             answered = [case for case in own if case.sliding_mode >= 0]
-            kept = [float(np.dtype(dtype_of(name)).type(found[case.case][0])) for case in answered]  # as in a file
-            times = [case.times_bounds((one, 0.0, 0, 0))[0] for case, one in zip(answered, kept, strict=True)]
+            kept = [
+                float(np.dtype(dtype_of(name)).type(found[case.case][0])) for case in answered
+            ]  # as in a file
+            times = [
+                case.times_bounds((one, 0.0, 0, 0))[0]
+                for case, one in zip(answered, kept, strict=True)
+            ]
             row.append(f"{number(median(times), 2)}, {number(max(times), 2)}")
         rows.append(row)
     header = ["hard because of", "cells", "conditioning", *answers]
@@ -74,7 +102,9 @@ def main() -> None:
     answers = {"cycle": solve(cases, solver="cycle")}
     for rule, steps in STEPPED:
         answers[f"{rule}, {steps}"] = solve(cases, solver="step", rule=rule, steps_per_cycle=steps)
-    dangers = [[one.__name__.replace("_", " "), (one.__doc__ or "").rstrip(".")] for one in CATEGORIES]
+    dangers = [
+        [one.__name__.replace("_", " "), (one.__doc__ or "").rstrip(".")] for one in CATEGORIES
+    ]
     (DOCS / "hard-cases.md").write_text(f"""# Hard cases
 
 Cases with the largest effects of rounding, and the errors of the solvers in them. Written by

@@ -1,7 +1,7 @@
 """Large sweeps to disk: ``python -m benchmarks.large_sweeps`` writes results/large_sweeps.md; minutes, 8 GB.
 
-`slipsweep run` of 10⁸ cells, beside what netCDF4 and xarray need to write the same arrays, and the memory that a run
-takes at its peak.  ``--larger 10`` adds 10⁹ cells in netCDF, once: 20 GB of disk.
+`slipsweep run` of 10⁸ cells, beside what netCDF4 and xarray need to write the same arrays, and the
+memory that a run takes at its peak.  ``--larger 10`` adds 10⁹ cells in netCDF, once: 20 GB of disk.
 """
 
 import os
@@ -28,7 +28,12 @@ TURNS = 3
 IN_MEMORY = 2e8
 
 #: Types of the results that are stored by default.
-DTYPES = {"permanent_displacement": "f8", "peak_relative_velocity": "f8", "sliding_mode": "i1", "validity": "i2"}
+DTYPES = {
+    "permanent_displacement": "f8",
+    "peak_relative_velocity": "f8",
+    "sliding_mode": "i1",
+    "validity": "i2",
+}
 
 
 def sweep_file(path: Path, lengths: Sequence[int]) -> Path:
@@ -72,14 +77,18 @@ def write_netcdf4(path: Path, lengths: Sequence[int]) -> float:
 
 def write_xarray(path: Path, lengths: Sequence[int]) -> float:
     """Seconds that xarray takes to write the same from memory."""
-    table = xr.Dataset({name: (NAMES, np.ones(tuple(lengths), kind)) for name, kind in DTYPES.items()})
+    table = xr.Dataset(
+        {name: (NAMES, np.ones(tuple(lengths), kind)) for name, kind in DTYPES.items()}
+    )
     started = time.perf_counter()
     table.to_netcdf(path)
     os.sync()
     return time.perf_counter() - started
 
 
-def measured(folder: Path, lengths: Sequence[int], turns: int, outputs: dict[str, tuple[str, ...]]) -> str:
+def measured(
+    folder: Path, lengths: Sequence[int], turns: int, outputs: dict[str, tuple[str, ...]]
+) -> str:
     """The table of a sweep of these lengths, written by `slipsweep run` to each of `outputs`, and by the others."""
     seconds: dict[str, list[float]] = {}
     memory: dict[str, float] = {}
@@ -89,8 +98,19 @@ def measured(folder: Path, lengths: Sequence[int], turns: int, outputs: dict[str
         others["xarray, the same arrays"] = write_xarray
     for _ in range(turns):  # in turn: other processes and the disk are not always the same
         for output, options in outputs.items():
-            what, path = f"`slipsweep run -o {' '.join((output, *options))}`", folder / output
-            command = ("-m", "slipsweep", "run", str(sweep), "-o", str(path), "-q", "--overwrite", *options)
+            what = f"`slipsweep run -o {' '.join((output, *options))}`"
+            path = folder / output
+            command = (
+                "-m",
+                "slipsweep",
+                "run",
+                str(sweep),
+                "-o",
+                str(path),
+                "-q",
+                "--overwrite",
+                *options,
+            )
             took, peak = seconds_and_memory(*command)
             seconds.setdefault(what, []).append(took)
             memory.setdefault(what, peak)  # later ones begin with that of this process
@@ -99,12 +119,22 @@ def measured(folder: Path, lengths: Sequence[int], turns: int, outputs: dict[str
             seconds.setdefault(what, []).append(write(folder / "c.nc", lengths))
             (folder / "c.nc").unlink()
     rows = [
-        [what, f"{np.median(took):.1f}", f"{min(took):.1f}", f"{memory[what]:.0f}" if what in memory else ""]
+        [
+            what,
+            f"{np.median(took):.1f}",
+            f"{min(took):.1f}",
+            f"{memory[what]:.0f}" if what in memory else "",
+        ]
         for what, took in seconds.items()
     ]
     times = "once" if turns == 1 else f"{turns} times each"
-    cells = f"{np.prod(lengths):,} cells, {np.prod(lengths) * 19 / 1e9:.2g} GB of results; {times}.\n\n"
-    return cells + machine.table(["what", "s, with sync: median", "least", "peak memory, MB"], rows).strip()
+    cells = (
+        f"{np.prod(lengths):,} cells, {np.prod(lengths) * 19 / 1e9:.2g} GB of results; {times}.\n\n"
+    )
+    return (
+        cells
+        + machine.table(["what", "s, with sync: median", "least", "peak memory, MB"], rows).strip()
+    )
 
 
 def main() -> None:
@@ -112,10 +142,16 @@ def main() -> None:
     given = machine.arguments(__doc__, counts={"larger": 0})
     lengths = (10, 5, 10, 20) if given.tiny else (100, 50, 100, 200)
     with tempfile.TemporaryDirectory(dir=Path.cwd()) as name:
-        outputs: dict[str, tuple[str, ...]] = {"a.nc": (), "b.nc": ("--memory", "1GB"), "a.zarr": ()}
+        outputs: dict[str, tuple[str, ...]] = {
+            "a.nc": (),
+            "b.nc": ("--memory", "1GB"),
+            "a.zarr": (),
+        }
         tables = []
         if given.larger:  # first: the peak of a process begins with that of this one
-            tables.append(measured(Path(name), (lengths[0] * given.larger, *lengths[1:]), 1, {"a.nc": ()}))
+            tables.append(
+                measured(Path(name), (lengths[0] * given.larger, *lengths[1:]), 1, {"a.nc": ()})
+            )
         tables.insert(0, measured(Path(name), lengths, 1 if given.tiny else TURNS, outputs))
     text = "\n\n".join([machine.measured_on(("numpy", "numba", "netCDF4", "zarr")), *tables])
     (given.folder / "large_sweeps.md").write_text(text + "\n")

@@ -1,9 +1,10 @@
 """Limit amplitudes held to dense scans: ``python -m benchmarks.limits`` writes limits.md.
 
-Draws blocks and tolerable displacements, and compares each limit with the first of many amplitudes, in equal ratios
-from Üy on, at which a sweep gives as much.  A limit that lies higher was missed; one that lies lower is a peak between
-two of the many.  ``.ci/include-report`` puts the table into docs/limit.md.  Nothing is timed; it ends with an error
-where a sweep gives less than the displacement at a limit, or as much just below.
+Draws blocks and tolerable displacements, and compares each limit with the first of many amplitudes,
+in equal ratios from Üy on, at which a sweep gives as much.  A limit that lies higher was missed;
+one that lies lower is a peak between two of the many.  ``.ci/include-report`` puts the table into
+docs/limit.md.  Nothing is timed; it ends with an error where a sweep gives less than the
+displacement at a limit, or as much just below.
 """
 
 import random
@@ -20,10 +21,13 @@ from tests.support.cases import choices
 from tests.support.strategies import G
 
 #: Blocks drawn of each kind, blocks compared together, and amplitudes of the dense scan.
-BLOCKS, TOGETHER, AMPLITUDES = 1500, 50, 16_384
+BLOCKS = 1500
+TOGETHER = 50
+AMPLITUDES = 16_384
 
 #: Where the search ends, and between which values a measured Üy is drawn, m/s².
-HIGHEST, _MEASURED = 5.0 * G, (0.05, 3.0)
+HIGHEST = 5.0 * G
+_MEASURED = (0.05, 3.0)
 
 #: Limits that differ by less than this part are the same.
 _SAME = 1e-9
@@ -40,32 +44,50 @@ class Group:
     def text(self, block: int) -> str:
         """One of the blocks."""
         given = {**self.blocks, "displacement": self.displacement}
-        return ", ".join(f"{name}={float(values[block])!r}" for name, values in given.items()) + f", {self.options}"
+        return (
+            ", ".join(f"{name}={float(values[block])!r}" for name, values in given.items())
+            + f", {self.options}"
+        )
 
 
 def _along_blocks(values: np.ndarray) -> xr.DataArray:
     return xr.DataArray(values, dims="block")
 
 
-def _group(rng: np.random.Generator, count: int, options: dict[str, Any], yields: tuple[float, float] | None) -> Group:
+def _group(
+    rng: np.random.Generator,
+    count: int,
+    options: dict[str, Any],
+    yields: tuple[float, float] | None,
+) -> Group:
     blocks = {"theta": rng.uniform(0.0, 25.0, count), "mu_s": rng.uniform(0.1, 1.3, count)}
     if yields is not None:
-        blocks["yield_acceleration"] = np.exp(rng.uniform(np.log(yields[0]), np.log(yields[1]), count))
+        blocks["yield_acceleration"] = np.exp(
+            rng.uniform(np.log(yields[0]), np.log(yields[1]), count)
+        )
     displacement = 10.0 ** rng.uniform(-4.0, np.log10(30.0), count)
-    return Group({name: _along_blocks(values) for name, values in blocks.items()}, _along_blocks(displacement), options)
+    return Group(
+        {name: _along_blocks(values) for name, values in blocks.items()},
+        _along_blocks(displacement),
+        options,
+    )
 
 
 def _rules(rng: np.random.Generator) -> dict[str, Any]:
-    rise, recoupling = rng.choice(["monotone", "literal"]), rng.choice(["eq12", "integrate"])
+    rise = rng.choice(["monotone", "literal"])
+    recoupling = rng.choice(["eq12", "integrate"])
     return {"rise": str(rise), "recoupling": str(recoupling)}
 
 
 def any_wave(rng: np.random.Generator, count: int) -> Group:
     """Any rise, recoupling and waveform; a measured Üy in half of the groups."""
     waves = (
-        slipsweep.Sine(), slipsweep.Cosine(), slipsweep.Square(), slipsweep.Triangle(),
+        slipsweep.Sine(),
+        slipsweep.Cosine(),
+        slipsweep.Square(),
+        slipsweep.Triangle(),
         slipsweep.Harmonics((1.0, 0.6, 0.35), (1, 2, 5), (0.0, 40.0, 100.0)),
-    )  # fmt: skip
+    )
     options = _rules(rng) | {"excitation": waves[rng.integers(len(waves))]}
     return _group(rng, count, options, _MEASURED if rng.random() < 0.5 else None)
 
@@ -74,7 +96,9 @@ def motion(rng: np.random.Generator, count: int) -> Group:
     """Motions of the sample suite, one for each group; up to 1 m."""
     files = sorted((ROOT / "sweeps" / "data" / "suite").glob("*.AT2"))
     record = slipsweep.read_record(files[rng.integers(len(files))])
-    group = _group(rng, count, _rules(rng) | {"excitation": record}, _MEASURED if rng.random() < 0.5 else None)
+    group = _group(
+        rng, count, _rules(rng) | {"excitation": record}, _MEASURED if rng.random() < 0.5 else None
+    )
     return replace(group, displacement=group.displacement / 30.0)
 
 
@@ -95,17 +119,24 @@ def ratios(group: Group, amplitudes: int) -> Iterator[float]:
     RuntimeError
         A sweep gives less than the displacement at a limit, or as much just below.
     """
-    shaking = {} if isinstance(group.options.get("excitation"), slipsweep.Record) else {"frequency": 1.0}
+    shaking = (
+        {} if isinstance(group.options.get("excitation"), slipsweep.Record) else {"frequency": 1.0}
+    )
     given = {**group.blocks, **shaking, **choices(**group.options)}
-    found = slipsweep.limit_amplitude(group.displacement, **given, maximum_amplitude=HIGHEST).limit_amplitude.values
+    found = slipsweep.limit_amplitude(
+        group.displacement, **given, maximum_amplitude=HIGHEST
+    ).limit_amplitude.values
 
     def reaches(amplitude: np.ndarray) -> np.ndarray:
         axis = xr.DataArray(amplitude, dims=("block", "step")[: amplitude.ndim])
-        moved = slipsweep.sweep(**given, amplitude=axis, variables=["permanent_displacement"]).permanent_displacement
+        moved = slipsweep.sweep(
+            **given, amplitude=axis, variables=["permanent_displacement"]
+        ).permanent_displacement
         return np.asarray((moved >= group.displacement).transpose(*axis.dims).values)
 
     has = np.isfinite(found)
-    at, below = np.where(has, found, HIGHEST), np.where(has, np.nextafter(found, 0.0), HIGHEST)
+    at = np.where(has, found, HIGHEST)
+    below = np.where(has, np.nextafter(found, 0.0), HIGHEST)
     if not (reaches(at)[has].all() and not reaches(below)[has].any()):
         raise RuntimeError("a sweep does not give the displacement from the limit on")
     known: dict[str, Any] = {**group.blocks, "variables": ["yield_acceleration"]}
@@ -121,12 +152,24 @@ def ratios(group: Group, amplitudes: int) -> Iterator[float]:
         elif not has[block]:
             yield np.inf
         else:
-            low, high = dense[block, max(first[block] - 1, 0)], dense[block, first[block]]
+            low = dense[block, max(first[block] - 1, 0)]
+            high = dense[block, first[block]]
             # the dense scan tells the limit to one of its steps only
-            yield 1.0 if low * (1.0 - _SAME) <= found[block] <= high * (1.0 + _SAME) else float(found[block] / high)
+            yield (
+                1.0
+                if low * (1.0 - _SAME) <= found[block] <= high * (1.0 + _SAME)
+                else float(found[block] / high)
+            )
 
 
-HEADER = ["blocks", "limits", "the same", "lower, where the dense scan misses a peak", "higher", "worst ratio"]
+HEADER = [
+    "blocks",
+    "limits",
+    "the same",
+    "lower, where the dense scan misses a peak",
+    "higher",
+    "worst ratio",
+]
 
 
 def main() -> None:
@@ -146,10 +189,16 @@ def main() -> None:
                     print(f"{kind}: {ratio:.6g} times, {group.text(block)}", flush=True)
         limits = [ratio for ratio in values if not np.isnan(ratio)]
         above = [ratio for ratio in limits if ratio > 1.0]
-        rows.append([
-            kind, len(limits), sum(ratio == 1.0 for ratio in limits), sum(ratio < 1.0 for ratio in limits), len(above),
-            number(max(above, default=1.0)),
-        ])  # fmt: skip
+        rows.append(
+            [
+                kind,
+                len(limits),
+                sum(ratio == 1.0 for ratio in limits),
+                sum(ratio < 1.0 for ratio in limits),
+                len(above),
+                number(max(above, default=1.0)),
+            ]
+        )
         print(*rows[-1], sep=", ", flush=True)
     (given.folder / "limits.md").write_text(
         f"{table(HEADER, rows)}\n{blocks:,} blocks of each kind, most with a limit, against {amplitudes:,} amplitudes; "

@@ -23,7 +23,10 @@ def processor() -> str:
     name = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():
-        name = next((line.split(":")[1].strip() for line in info.open() if line.startswith("model name")), name)
+        name = next(
+            (line.split(":")[1].strip() for line in info.open() if line.startswith("model name")),
+            name,
+        )
     return f"{name}, {cores()} cores"
 
 
@@ -47,15 +50,20 @@ def measured_on(packages: Iterable[str] = ("numpy", "numba", "xarray"), timed: b
     """The sentence that stands over every table; over times it says so if other processes had the cores, too."""
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     is_busy = timed and load > 2 * cores()
-    busy = f" Other processes used the machine (load {load:.0f}): times are rough." if is_busy else ""
+    busy = (
+        f" Other processes used the machine (load {load:.0f}): times are rough." if is_busy else ""
+    )
     return f"Measured on {processor()}; {platform.system()}, {versions(packages)}, slipsweep {__version__}.{busy}"
 
 
-def alternate(functions: Mapping[str, Callable[[], object]], repeats: int, calls: int = 1) -> dict[str, float]:
+def alternate(
+    functions: Mapping[str, Callable[[], object]], repeats: int, calls: int = 1
+) -> dict[str, float]:
     """Median seconds of each function, called in turn `repeats` times after an unmeasured call.
 
-    Taking turns puts a slow spell of a shared machine on all of them alike.  The best of `calls` at a turn counts: the
-    first of them may have to get memory from the host of a virtual machine, at up to 2.5 µs for 4 KB.
+    Taking turns puts a slow spell of a shared machine on all of them alike.  The best of `calls` at
+    a turn counts: the first of them may have to get memory from the host of a virtual machine, at
+    up to 2.5 µs for 4 KB.
     """
     for function in functions.values():
         function()
@@ -99,7 +107,10 @@ def arguments(
     parser = argparse.ArgumentParser(description=(description or "").split("\n")[0])
     parser.add_argument("--tiny", action="store_true", help="a few cells only, to see that it runs")
     parser.add_argument(
-        "--folder", type=Path, default=folder, help="where tables and figures go (default: %(default)s)"
+        "--folder",
+        type=Path,
+        default=folder,
+        help="where tables and figures go (default: %(default)s)",
     )
     for name, default in (counts or {}).items():
         parser.add_argument(f"--{name}", type=int, default=default, help="(default: %(default)s)")

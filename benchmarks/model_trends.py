@@ -1,9 +1,9 @@
 """What the model's numbers are worth: ``python -m benchmarks.model_trends``.
 
-Writes experiments.md, the paper's two experiments under every choice of inputs that an engineer has;
-sensitivity.md, how far each input moves them; and model_trends.md, how often the displacement of a lined slope
-goes against what a block is expected to do.  ``.ci/include-report`` puts them into README.md and docs/trust.md.
-Nothing is timed.
+Writes experiments.md, the paper's two experiments under every choice of inputs that an engineer
+has; sensitivity.md, how far each input moves them; and model_trends.md, how often the displacement
+of a lined slope goes against what a block is expected to do.  ``.ci/include-report`` puts them into
+README.md and docs/trust.md. Nothing is timed.
 """
 
 from typing import Any
@@ -17,7 +17,8 @@ from benchmarks.machine import arguments, table
 from slipsweep import SlidingMode, Validity
 from slipsweep.model.variables import CAUTIONS
 
-#: The paper's Tables 1 and 2: the table moved with the frequency and the amplitude, and what was identified.
+#: The paper's Tables 1 and 2: the table moved with the frequency and the amplitude, and what was
+#: identified.
 STICK_SLIP = {"theta": 5.0, "mu_s": 0.38, "amplitude": 3.55, "frequency": 1.8}
 CONTINUOUS = {"theta": 6.0, "mu_s": 0.38, "amplitude": 5.10, "frequency": 3.5}
 MEASURED_YIELD = (0.59, 0.08)
@@ -69,8 +70,13 @@ def experiments() -> str:
             inputs = cell | {name: values[which] for name, values in given.items()}
             found = slipsweep.sweep(**inputs, excitation=slipsweep.Sine(cycles=CYCLES), model=model)  # type: ignore[arg-type]
             about = []
-            if model != "newmark" and found.sliding_mode != (SlidingMode.STICK_SLIP, SlidingMode.CONTINUOUS)[which]:
-                about.append(f"as {SlidingMode(found.sliding_mode.item()).name.lower().replace('_', '–')}")
+            if (
+                model != "newmark"
+                and found.sliding_mode != (SlidingMode.STICK_SLIP, SlidingMode.CONTINUOUS)[which]
+            ):
+                about.append(
+                    f"as {SlidingMode(found.sliding_mode.item()).name.lower().replace('_', '–')}"
+                )
             if found.validity & Validity.NOT_RECOUPLED:
                 about.append("does not re-stick")
             value = f"{found.permanent_displacement.item() * 1000:.0f}"
@@ -98,15 +104,22 @@ def sensitivity() -> str:
         row: list[object] = [symbol]
         for cell in cells:
             base = displacement(cell)
-            row += [f"{displacement(cell | {name: cell[name] * by}) / base - 1:+.0%}" for by in (0.9, 1.1)]
+            row += [
+                f"{displacement(cell | {name: cell[name] * by}) / base - 1:+.0%}"
+                for by in (0.9, 1.1)
+            ]
         rows.append(row)
     return table(["input", "stick–slip, −10 %", "+10 %", "continuous, −10 %", "+10 %"], rows)
 
 
-def against(found: xr.Dataset, axis: str) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
+def against(
+    found: xr.Dataset, axis: str
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
     """Steps of the grid along an axis: with a displacement at both ends, against what is expected, with a caution."""
-    low, high = found.isel({axis: slice(None, -1)}), found.isel({axis: slice(1, None)})
-    before, after = low.permanent_displacement.values, high.permanent_displacement.values
+    low = found.isel({axis: slice(None, -1)})
+    high = found.isel({axis: slice(1, None)})
+    before = low.permanent_displacement.values
+    after = high.permanent_displacement.values
     there = np.isfinite(before) & np.isfinite(after) & ((before != 0) | (after != 0))
     with np.errstate(invalid="ignore"):
         change = EXPECTED[axis] * (after - before)
@@ -119,21 +132,33 @@ def trends(tiny: bool) -> str:
     grid: dict[str, Any] = {name: values[:: 8 if tiny else 1] for name, values in SLOPE.items()}
     rows: list[list[object]] = []
     for text, options in MODELS.items():
-        found = slipsweep.sweep(**grid, frequency=1.0, excitation=slipsweep.Sine(cycles=15), **options)
+        found = slipsweep.sweep(
+            **grid, frequency=1.0, excitation=slipsweep.Sine(cycles=15), **options
+        )
         for mode in (SlidingMode.STICK_SLIP, SlidingMode.CONTINUOUS):
             row: list[object] = [text, mode.name.lower().replace("_", "–")]
             warned = total = 0
             for axis in EXPECTED:
                 there, wrong, caution = against(found, axis)
                 codes = found.sliding_mode
-                both = [codes.isel({axis: part}).values == mode for part in (slice(None, -1), slice(1, None))]
+                both = [
+                    codes.isel({axis: part}).values == mode
+                    for part in (slice(None, -1), slice(1, None))
+                ]
                 inside = there & both[0] & both[1]
                 row.append(f"{(wrong & inside).sum() / inside.sum():.0%}" if inside.any() else "")
                 warned += int((wrong & inside & caution).sum())
                 total += int((wrong & inside).sum())
             if any(row[2:]):
                 rows.append([*row, f"{warned / total:.0%}" if total else ""])
-    header = ["inputs", "mode", "falls with PGA", "rises with μs", "falls with θ", "of these, under a caution"]
+    header = [
+        "inputs",
+        "mode",
+        "falls with PGA",
+        "rises with μs",
+        "falls with θ",
+        "of these, under a caution",
+    ]
     return table(header, rows)
 
 
@@ -147,7 +172,8 @@ def main() -> None:
         encoding="utf-8",
     )
     (given.folder / "sensitivity.md").write_text(
-        f"{sensitivity()}\nWith Üy measured, λ and Δμ as printed, {CYCLES} cycles. {by}", encoding="utf-8"
+        f"{sensitivity()}\nWith Üy measured, λ and Δμ as printed, {CYCLES} cycles. {by}",
+        encoding="utf-8",
     )
     cells = " × ".join(str(values.size) for values in SLOPE.values())
     (given.folder / "model_trends.md").write_text(

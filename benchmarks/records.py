@@ -2,12 +2,12 @@
 
 Agreement: every motion at ky = 0.1 g, against pySLAMMER's RigidAnalysis on the motion as it is and
 on the same straight lines sampled 4 and 16 times as finely, and against pyNewmarkDisp, as it is and
-with Newmark's braking put into its rule.  Time: a
-million (ky, motion, scale) analyses by slipsweep; the paper's law, and pySLAMMER, on a share of them.
-Writes records.md.
+with Newmark's braking put into its rule.  Time: a million (ky, motion, scale) analyses by
+slipsweep; the paper's law, and pySLAMMER, on a share of them. Writes records.md.
 
-``--slammer FILE`` compares with SLAMMER 1.1 itself: the table of its results that pySLAMMER is verified against,
-tests/verification_data/reference/SLAMMER_results.xlsx in pySLAMMER's repository, which its package does not have.
+``--slammer FILE`` compares with SLAMMER 1.1 itself: the table of its results that pySLAMMER is
+verified against, tests/verification_data/reference/SLAMMER_results.xlsx in pySLAMMER's repository,
+which its package does not have.
 """
 
 import argparse
@@ -27,7 +27,9 @@ KY = 0.1
 EVERY_KY = (0.02, 0.05, 0.1, 0.2, 0.3)
 
 #: pySLAMMER's tolerance for SLAMMER's results: a part of those above `SMALL`, m below.
-SMALL, PART, METRES = 0.005, 0.02, 0.0005
+SMALL = 0.005
+PART = 0.02
+METRES = 0.0005
 
 #: An analysis: motion, ky, factor on the motion, and another program's displacement, m.
 Run = tuple[str, float, float, float]
@@ -45,7 +47,9 @@ def motions() -> dict[str, Any]:
 
 def refined(values: np.ndarray, parts: int) -> np.ndarray:
     """The straight lines between samples, sampled `parts` times as finely."""
-    return np.interp(np.arange((values.size - 1) * parts + 1) / parts, np.arange(values.size), values)
+    return np.interp(
+        np.arange((values.size - 1) * parts + 1) / parts, np.arange(values.size), values
+    )
 
 
 def pyslammer_displacement(motion: Any, parts: int, ky: float = KY, factor: float = 1.0) -> float:
@@ -59,7 +63,9 @@ def pyslammer_displacement(motion: Any, parts: int, ky: float = KY, factor: floa
 def exact_displacement(motion: Any, g: float, ky: float = KY, factor: float = 1.0) -> float:
     """Newmark's block by slipsweep, m."""
     record = Record.sampled(factor * motion.accel * g, motion.dt)
-    return float(sweep(yield_coefficient=ky, model=Newmark(g), excitation=record).permanent_displacement)
+    return float(
+        sweep(yield_coefficient=ky, model=Newmark(g), excitation=record).permanent_displacement
+    )
 
 
 def pynewmark_displacement(motion: Any, parts: int, g: float) -> float:
@@ -89,7 +95,9 @@ def slammer_runs(path: Path, found: dict[str, Any]) -> list[Run]:
     import pandas as pd
 
     runs = []
-    for row in pd.read_excel(path).drop_duplicates(["Earthquake", "Record", "ky (g)"]).to_dict("records"):
+    for row in (
+        pd.read_excel(path).drop_duplicates(["Earthquake", "Record", "ky (g)"]).to_dict("records")
+    ):
         name = f"{row['Earthquake'].replace('.', '').replace(' ', '_')}_{row['Record']}"
         if name not in found:  # --tiny
             continue
@@ -101,7 +109,9 @@ def slammer_runs(path: Path, found: dict[str, Any]) -> list[Run]:
 
 def comparison(found: dict[str, Any], runs: list[Run], g: float) -> str:
     """Another program's displacements over slipsweep's: slope, R², share within the tolerance; the worst, refined."""
-    ours = np.array([exact_displacement(found[name], g, ky, factor) for name, ky, factor, _ in runs])
+    ours = np.array(
+        [exact_displacement(found[name], g, ky, factor) for name, ky, factor, _ in runs]
+    )
     theirs = np.array([run[-1] for run in runs])
     apart = np.abs(theirs - ours)
     within = np.mean(apart <= np.where(theirs > SMALL, PART * theirs, METRES))
@@ -109,9 +119,23 @@ def comparison(found: dict[str, Any], runs: list[Run], g: float) -> str:
     for at in np.argsort(-apart / np.maximum(theirs, SMALL))[:5]:
         name, ky, factor, other = runs[at]
         refined_runs = (pyslammer_displacement(found[name], parts, ky, factor) for parts in PARTS)
-        rows.append([name, ky, f"{factor:+.3g}", *(f"{1000 * u:.3f}" for u in (other, ours[at], *refined_runs))])
+        rows.append(
+            [
+                name,
+                ky,
+                f"{factor:+.3g}",
+                *(f"{1000 * u:.3f}" for u in (other, ours[at], *refined_runs)),
+            ]
+        )
     refinements = (f"pySLAMMER, Δt/{parts}" for parts in PARTS)
-    header = ["the five farthest apart, mm", "ky, g", "factor", "the other", "slipsweep", *refinements]
+    header = [
+        "the five farthest apart, mm",
+        "ky, g",
+        "factor",
+        "the other",
+        "slipsweep",
+        *refinements,
+    ]
     return (
         f"{len(runs)} analyses: slope {(ours @ theirs) / (ours @ ours):.4f}, "
         f"R² {np.corrcoef(ours, theirs)[0, 1] ** 2:.6f}, {within:.0%} within pySLAMMER's tolerance ({PART:.0%}; "
@@ -123,7 +147,10 @@ def timing(found: dict[str, Any], g: float, analyses: int, share: int) -> str:
     """Processor time of `analyses` by slipsweep in one run, of a share of them by the paper's law and by pySLAMMER."""
     from pyslammer import RigidAnalysis
 
-    suite = Suite(tuple(Record.sampled(motion.accel * g, motion.dt) for motion in found.values()), tuple(found))
+    suite = Suite(
+        tuple(Record.sampled(motion.accel * g, motion.dt) for motion in found.values()),
+        tuple(found),
+    )
     samples = float(np.mean([motion.accel.size for motion in found.values()]))
 
     def axes(wanted: int) -> tuple[np.ndarray, np.ndarray]:
@@ -135,16 +162,24 @@ def timing(found: dict[str, Any], g: float, analyses: int, share: int) -> str:
         newmark = {"yield_coefficient": onsets}
         mendez = {"theta": 0.0, "mu_s": 0.3, "yield_acceleration": onsets * g}
         start = time.process_time()
-        result = sweep(**(newmark if model == "newmark" else mendez), excitation=suite, scale=scales, model=model)
+        result = sweep(
+            **(newmark if model == "newmark" else mendez),
+            excitation=suite,
+            scale=scales,
+            model=model,
+        )
         return result.permanent_displacement.size, time.process_time() - start
 
     def theirs() -> tuple[int, float]:
         onsets, scales = axes(analyses)
-        rng, every = np.random.default_rng(1), list(found.values())
+        rng = np.random.default_rng(1)
+        every = list(found.values())
         start = time.process_time()
         for index in range(share):
             # every motion in turn, so that the share has the samples of the whole
-            RigidAnalysis(rng.choice(onsets), every[index % len(every)], scale_factor=rng.choice(scales))
+            RigidAnalysis(
+                rng.choice(onsets), every[index % len(every)], scale_factor=rng.choice(scales)
+            )
         return share, time.process_time() - start
 
     ours(1, "newmark"), ours(1, "mendez"), theirs()  # compiled, and loaded, before the clock starts
@@ -159,8 +194,18 @@ def timing(found: dict[str, Any], g: float, analyses: int, share: int) -> str:
     for name, (done, seconds) in runs.items():
         figures = [seconds, each[name], each[name] / samples, peer / each[name]]
         rows.append([name, done, *map(number, figures)])
-    header = ["", "analyses", "seconds", "seconds an analysis", "seconds a sample", "times pySLAMMER's speed"]
-    return table(header, rows) + f"\nThe paper's law takes {number(law / ky)} times as long as Newmark's block.\n"
+    header = [
+        "",
+        "analyses",
+        "seconds",
+        "seconds an analysis",
+        "seconds a sample",
+        "times pySLAMMER's speed",
+    ]
+    return (
+        table(header, rows)
+        + f"\nThe paper's law takes {number(law / ky)} times as long as Newmark's block.\n"
+    )
 
 
 def main(given: argparse.Namespace) -> Path:
@@ -174,11 +219,19 @@ def main(given: argparse.Namespace) -> Path:
             found = dict(list(found.items())[-2:-1])
         agree = agreement(found, G_EARTH)
         pairs = [(name, ky) for name in found for ky in EVERY_KY]
-        fits = {"pySLAMMER": [(name, ky, 1.0, pyslammer_displacement(found[name], 1, ky)) for name, ky in pairs]}
+        fits = {
+            "pySLAMMER": [
+                (name, ky, 1.0, pyslammer_displacement(found[name], 1, ky)) for name, ky in pairs
+            ]
+        }
         if given.slammer:
             fits["SLAMMER"] = slammer_runs(given.slammer, found)
-        compared = "".join(f"**{name}.** {comparison(found, runs, G_EARTH)}\n" for name, runs in fits.items())
-        times = timing(found, G_EARTH, 100 if given.tiny else 1_000_000, 2 if given.tiny else 4 * len(found))
+        compared = "".join(
+            f"**{name}.** {comparison(found, runs, G_EARTH)}\n" for name, runs in fits.items()
+        )
+        times = timing(
+            found, G_EARTH, 100 if given.tiny else 1_000_000, 2 if given.tiny else 4 * len(found)
+        )
     page = given.folder / "records.md"
     page.write_text(
         "# Newmark's block on recorded motions\n\n"

@@ -29,7 +29,9 @@ WAVES: dict[str, Waveform] = {
     "triangle": slipsweep.Triangle(),
     "triangle, ramps of 2 cycles at both ends": slipsweep.Triangle(ramp_in=2, ramp_out=2),
     "harmonics, one of multiple 1": slipsweep.Harmonics((1.0,), (1,)),
-    "harmonics, multiples 1, 2 and 5": slipsweep.Harmonics((1.0, 0.6, 0.35), (1, 2, 5), (0.0, 40.0, 100.0)),
+    "harmonics, multiples 1, 2 and 5": slipsweep.Harmonics(
+        (1.0, 0.6, 0.35), (1, 2, 5), (0.0, 40.0, 100.0)
+    ),
     "harmonics, multiples 1 and 50": slipsweep.Harmonics((1.0, 0.15), (1, 50)),
 }
 
@@ -53,18 +55,29 @@ def cycle_solver(tiny: bool) -> str:
     def run(grid: dict[str, Any]) -> Callable[[], object]:
         return lambda: displacement(**grid, solver="cycle")
 
-    times = alternate({name: run(grid) for name, grid in grids.items()}, 2 if tiny else 9, calls=1 if tiny else 3)
+    times = alternate(
+        {name: run(grid) for name, grid in grids.items()}, 2 if tiny else 9, calls=1 if tiny else 3
+    )
     groups = sample.read()
     rows = []
     for name, grid in grids.items():
         regimes = [name] if name in groups else ["stuck", "stick_slip", "continuous"]
-        errors = [group.errors(group.displacement("cycle")) for regime in regimes for group in groups[regime]]
-        error, cells = np.concatenate(errors), size_of(grid)
+        errors = [
+            group.errors(group.displacement("cycle"))
+            for regime in regimes
+            for group in groups[regime]
+        ]
+        error = np.concatenate(errors)
+        cells = size_of(grid)
         row = [name.replace("_", "–"), f"{cells:,}", number(times[name] * cores() / cells * 1e9)]
-        rows.append([*row, number(float(np.nanmedian(error)), 2), number(float(np.nanmax(error)), 2)])
+        rows.append(
+            [*row, number(float(np.nanmedian(error)), 2), number(float(np.nanmax(error)), 2)]
+        )
     grid = grids["design chart"]
     found = slipsweep.sweep(**grid, variables=["sliding_mode"]).sliding_mode.values
-    shares = ", ".join(f"{np.mean(found == mode):.0%} {mode.name.lower()}" for mode in slipsweep.SlidingMode)
+    shares = ", ".join(
+        f"{np.mean(found == mode):.0%} {mode.name.lower()}" for mode in slipsweep.SlidingMode
+    )
     return (
         "## The cycle solver\n\n"
         + table(["cells", "number", "ns a cell and core", "median error", "worst error"], rows)
@@ -80,7 +93,8 @@ def four_dimensions(tiny: bool) -> str:
     grid["frequency"] = np.geomspace(0.1, 20.0, 5 if tiny else 100)
     cells = size_of(grid)
     times = alternate(
-        {"slipsweep.sweep": lambda: displacement(**grid), "np.full": lambda: np.full(cells, 1.0)}, 1 if tiny else 5
+        {"slipsweep.sweep": lambda: displacement(**grid), "np.full": lambda: np.full(cells, 1.0)},
+        1 if tiny else 5,
     )
     memory = ""
     if Path("/proc/self/clear_refs").exists():
@@ -89,7 +103,10 @@ def four_dimensions(tiny: bool) -> str:
             f" Sweeping {result / 1e6:,.0f} MB of result raises the memory of a process that has its kernels by "
             f"{whole / result:.2f} times that, at its peak."
         )
-    rows = [[name, number(seconds, 3), number(8 * cells / seconds / 1e9, 3)] for name, seconds in times.items()]
+    rows = [
+        [name, number(seconds, 3), number(8 * cells / seconds / 1e9, 3)]
+        for name, seconds in times.items()
+    ]
     ratio = times["slipsweep.sweep"] / times["np.full"]
     return (
         f"## A 4-D sweep of {cells:,} cells\n\n"
@@ -109,7 +126,9 @@ def peak_memory(tiny: bool) -> tuple[float, float]:
         f"found = run({4 if tiny else 200});"
         "print((held('VmHWM') - before) * 1024, found.nbytes)"
     )
-    printed = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+    printed = subprocess.run(
+        [sys.executable, "-c", code], check=True, capture_output=True, text=True
+    ).stdout
     peak, result = map(float, printed.split())
     return peak, result
 
@@ -121,7 +140,9 @@ def waveforms(tiny: bool) -> str:
     def run(wave: Waveform) -> Callable[[], object]:
         return lambda: displacement(**grid, excitation=wave)
 
-    times = alternate({name: run(wave) for name, wave in WAVES.items()}, 1 if tiny else 5, calls=1 if tiny else 2)
+    times = alternate(
+        {name: run(wave) for name, wave in WAVES.items()}, 1 if tiny else 5, calls=1 if tiny else 2
+    )
     rows = [
         [name, number(seconds * cores() / size_of(grid) * 1e9), number(seconds / times["sine"], 2)]
         for name, seconds in times.items()
@@ -150,18 +171,25 @@ def start_up(tiny: bool) -> str:
 
         def sweep(cache: str | None, name: str) -> Callable[[], object]:
             def run() -> None:
-                output = Path(folder) / f"out{next(fresh)}.nc"  # to replace one of 83 MB takes 15 ms by itself
+                output = (
+                    Path(folder) / f"out{next(fresh)}.nc"
+                )  # to replace one of 83 MB takes 15 ms by itself
                 process(cache, sys.executable, "-m", "slipsweep", "run", name, "-o", str(output))()
 
             return run
 
         warm = {f"`slipsweep run {name}`, warm": sweep("warm", name) for name in sweeps} | {
             "`slipsweep --help`": process("warm", sys.executable, "-m", "slipsweep", "--help"),
-            "`python -c 'import numba, xarray'`": process("warm", sys.executable, "-c", "import numba, xarray"),
+            "`python -c 'import numba, xarray'`": process(
+                "warm", sys.executable, "-c", "import numba, xarray"
+            ),
         }
         if tiny:
             warm = {name: run for name, run in warm.items() if "help" in name}
-        cold = {f"`slipsweep run {name}`, first ever": sweep(None, name) for name in (() if tiny else sweeps)}
+        cold = {
+            f"`slipsweep run {name}`, first ever": sweep(None, name)
+            for name in (() if tiny else sweeps)
+        }
         times = alternate(cold, 2) | alternate(warm, 1 if tiny else 7)
     rows = [[name, number(seconds)] for name, seconds in times.items()]
     return "## Start-up, whole process\n\n" + table(["", "s"], rows)
@@ -172,12 +200,15 @@ def main() -> None:
     given = arguments(__doc__)
     tiny = given.tiny
     parts = [
-        "# What slipsweep takes\n\n" + measured_on(("numpy", "numba", "llvmlite", "xarray", "netCDF4")),
+        "# What slipsweep takes\n\n"
+        + measured_on(("numpy", "numba", "llvmlite", "xarray", "netCDF4")),
         "Written by `python -m benchmarks.report`.\n",
     ]
     for section in (cycle_solver, waveforms, four_dimensions, start_up):
         parts.append(section(tiny))
-        (given.folder / "report.md").write_text("\n".join(parts))  # what is measured stands, whatever comes after
+        (given.folder / "report.md").write_text(
+            "\n".join(parts)
+        )  # what is measured stands, whatever comes after
 
 
 if __name__ == "__main__":

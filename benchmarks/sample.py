@@ -1,9 +1,9 @@
 """A fixed random sample of cells with their 30-digit displacements, data/sample.csv.
 
-Sixty-four cells a regime, one cycle of loading each, so that no solver gains from knowing
-that cycles repeat.  Stuck, stick-slip, continuous and Newmark cells are uniform over the
-range of the design chart and 1 % clear of the regime's ends; the hard ones are the hard
-categories of tests/data/cases.csv that the default options can take.  tests/test_benchmarks.py solves some again.
+Sixty-four cells a regime, one cycle of loading each, so that no solver gains from knowing that
+cycles repeat.  Stuck, stick-slip, continuous and Newmark cells are uniform over the range of the
+design chart and 1 % clear of the regime's ends; the hard ones are the hard categories of
+tests/data/cases.csv that the default options can take.  tests/test_benchmarks.py solves some again.
 """
 
 from dataclasses import dataclass
@@ -43,7 +43,9 @@ class Group:
     def errors(self, displacement: Array) -> Array:
         """|u − reference| over |reference|; over A/ω² where the reference is 0."""
         omega = 2 * np.pi * self.inputs["frequency"]
-        scale = np.where(self.reference == 0, self.inputs["amplitude"] / omega**2, np.abs(self.reference))
+        scale = np.where(
+            self.reference == 0, self.inputs["amplitude"] / omega**2, np.abs(self.reference)
+        )
         return np.asarray(np.abs(displacement - self.reference) / scale)
 
     def take(self, cells: NDArray[np.int_]) -> "Group":
@@ -54,9 +56,17 @@ class Group:
     def displacement(self, solver: Any) -> Array:
         """What a solver of `slipsweep.sweep` gives."""
         given = {name: values for name, values in self.inputs.items() if not np.isnan(values).all()}
-        cells: dict[str, Any] = {name: xr.DataArray(values, dims="cell") for name, values in given.items()}
-        options: dict[str, Any] = {"model": self.model, "solver": solver, "variables": ["permanent_displacement"]}
-        return slipsweep.sweep(**cells, **options, excitation=slipsweep.Sine(1)).permanent_displacement.to_numpy()
+        cells: dict[str, Any] = {
+            name: xr.DataArray(values, dims="cell") for name, values in given.items()
+        }
+        options: dict[str, Any] = {
+            "model": self.model,
+            "solver": solver,
+            "variables": ["permanent_displacement"],
+        }
+        return slipsweep.sweep(
+            **cells, **options, excitation=slipsweep.Sine(1)
+        ).permanent_displacement.to_numpy()
 
 
 def read() -> dict[str, list[Group]]:
@@ -64,7 +74,11 @@ def read() -> dict[str, list[Group]]:
     rows = pd.read_csv(SAMPLE, float_precision="round_trip")
     found: dict[str, list[Group]] = {regime: [] for regime in REGIMES}
     given = [rows[name].notna() for name in INPUTS]
-    for (regime, model, *_), part in rows.groupby([rows.regime, rows.model, rows.sliding_mode, *given], sort=False):
+    for (regime, model, *_), part in rows.groupby(
+        [rows.regime, rows.model, rows.sliding_mode, *given], sort=False
+    ):
         inputs = {name: part[name].to_numpy(float) for name in INPUTS}
-        found[regime].append(Group(regime, model, inputs, part.permanent_displacement.to_numpy(float)))
+        found[regime].append(
+            Group(regime, model, inputs, part.permanent_displacement.to_numpy(float))
+        )
     return found

@@ -1,9 +1,9 @@
 """What an error costs, by both solvers and by other programs: ``python -m benchmarks.speed_vs_error``.
 
-Writes speed_vs_error.csv and .png, and engines.md.  Cells are those of `benchmarks.sample`, one cycle each, over and
-over up to as many as fill batches and hide a call; those programs of `benchmarks.engines` that solve one after the
-other take each once.  Errors are relative, against 30 digits; times are processor time a cell, of all threads together,
-without compiling.
+Writes speed_vs_error.csv and .png, and engines.md.  Cells are those of `benchmarks.sample`, one
+cycle each, over and over up to as many as fill batches and hide a call; those programs of
+`benchmarks.engines` that solve one after the other take each once.  Errors are relative, against 30
+digits; times are processor time a cell, of all threads together, without compiling.
 """
 
 import csv
@@ -27,13 +27,15 @@ from benchmarks.sample import Group
 
 STEPS = tuple(2**k for k in range(5, 15))
 
-MOST_CELLS, STEPS_AT_A_TIME = 2**18, 2**20
+MOST_CELLS = 2**18
+STEPS_AT_A_TIME = 2**20
 
 COLOURS = {"cycle": "#d62728", "simpson": "#08519c", "trapezoid": "#3182bd", "rectangle": "#9ecae1"}
 COLOURS |= {name: program.colour for name, program in engines.PROGRAMS.items()}
 
 #: Regimes in the order of the panels, and those that the other programs solve.
-REGIMES, COMPARED = ("stick_slip", "continuous", "newmark", "hard"), ("newmark", "stick_slip")
+REGIMES = ("stick_slip", "continuous", "newmark", "hard")
+COMPARED = ("newmark", "stick_slip")
 
 #: Errors of the table.
 WANTED = (1e-3, 1e-6, 1e-9, 1e-12)
@@ -64,18 +66,30 @@ def cpu_time(function: Callable[[], object], least: float) -> float:
 
 
 def measure(
-    solver: str, setting: float, groups: list[Group], solve: Callable[[Group, Any], np.ndarray], by: Any, cells: int
+    solver: str,
+    setting: float,
+    groups: list[Group],
+    solve: Callable[[Group, Any], np.ndarray],
+    by: Any,
+    cells: int,
 ) -> Point:
     """A point from all groups of a regime, each repeated up to some cells and solved with the option `by`."""
-    seconds, errors = 0.0, []
+    seconds = 0.0
+    errors = []
     for group in groups:
         many = group.take(np.tile(np.arange(group.size), max(1, cells // group.size)))
         errors.append(group.errors(solve(many, by)[: group.size]))
-        seconds += cpu_time(partial(solve, many, by), 0.05 if cells > 64 else 0.0) / many.size * group.size
+        seconds += (
+            cpu_time(partial(solve, many, by), 0.05 if cells > 64 else 0.0) / many.size * group.size
+        )
     error = np.concatenate(errors)
     error[~np.isfinite(error)] = np.inf
-    middle, high, worst = (float(np.percentile(error, share, method="higher")) for share in (50, 95, 100))
-    return Point(solver, setting, groups[0].regime, error.size, seconds / error.size, middle, high, worst)
+    middle, high, worst = (
+        float(np.percentile(error, share, method="higher")) for share in (50, 95, 100)
+    )
+    return Point(
+        solver, setting, groups[0].regime, error.size, seconds / error.size, middle, high, worst
+    )
 
 
 def points(tiny: bool) -> Iterator[Point]:
@@ -89,7 +103,9 @@ def points(tiny: bool) -> Iterator[Point]:
         for rule in RULES:
             for steps in STEPS[:2] if tiny else STEPS:
                 cells = min(most, STEPS_AT_A_TIME // steps)
-                yield measure(rule, steps, used, Group.displacement, slipsweep.Step(rule, steps), cells)
+                yield measure(
+                    rule, steps, used, Group.displacement, slipsweep.Step(rule, steps), cells
+                )
     for name, program in engines.PROGRAMS.items():
         for regime in program.regimes if find_spec(name) else ():
             group = engines.begin_at_yield(found[regime][0])
@@ -106,7 +122,9 @@ def write_csv(found: list[Point], path: Path) -> None:
         writer.writerows(asdict(point) for point in found)
 
 
-def coarsest(found: list[Point], regimes: Sequence[str], solvers: Sequence[str], errors: Sequence[float]) -> str:
+def coarsest(
+    found: list[Point], regimes: Sequence[str], solvers: Sequence[str], errors: Sequence[float]
+) -> str:
     """A table of the coarsest settings with which 95 of 100 cells are within an error, and of their times."""
     rows = []
     for regime, solver in itertools.product(regimes, solvers):
@@ -137,17 +155,29 @@ def draw(found: list[Point], path: Path) -> None:
             if solver == "cycle":
                 look = {"marker": "*", "ms": 15, "label": solver}
             elif solver in engines.PROGRAMS:
-                look = {"marker": engines.PROGRAMS[solver].marker, "ms": 4, "ls": "--", "label": solver}
+                look = {
+                    "marker": engines.PROGRAMS[solver].marker,
+                    "ms": 4,
+                    "ls": "--",
+                    "label": solver,
+                }
             axis.errorbar(
-                [point.seconds_per_cell for point in own], middle, (np.zeros_like(middle), high - middle),
-                color=colour, lw=1.2, elinewidth=0.6, **look,
-            )  # fmt: skip
+                [point.seconds_per_cell for point in own],
+                middle,
+                (np.zeros_like(middle), high - middle),
+                color=colour,
+                lw=1.2,
+                elinewidth=0.6,
+                **look,
+            )
         axis.set(xscale="log", yscale="log", title=regime.replace("_", "–"), ylim=(3e-18, 30))
         axis.grid(which="major", alpha=0.3)
     axes[1, 1].legend(fontsize="small", loc="center right")
     figure.supxlabel("processor time a cell, s")
     figure.supylabel("relative error of the displacement")
-    figure.suptitle("What an error costs (median, whisker to the 95th percentile): down and to the left is better")
+    figure.suptitle(
+        "What an error costs (median, whisker to the 95th percentile): down and to the left is better"
+    )
     figure.savefig(path, dpi=150)
 
 

@@ -1,7 +1,7 @@
 """The documentation site: `sphinx-build -c docs . build/site`, from the root folder of the clone.
 
-The pages are the Markdown files of the clone as they stand, so that links between them hold on the site as on a code
-host.  Notebooks are executed.  The reference is made of the docstrings.
+The pages are the Markdown files of the clone as they stand, so that links between them hold on the
+site as on a code host.  Notebooks are executed.  The reference is made of the docstrings.
 """
 
 import base64
@@ -36,22 +36,27 @@ extensions = [
 root_doc = "docs/index"
 include_patterns = ["*.md", "docs/**", *MEASUREMENTS]
 exclude_patterns = [".*", "build", "src", "tests", "docs/_templates", "**.ipynb_checkpoints"]
-templates_path = [str(ROOT / "docs" / "_templates")]  # autosummary looks from the source folder, others from here
+templates_path = [
+    str(ROOT / "docs" / "_templates")
+]  # autosummary looks from the source folder, others from here
 default_role = "literal"
 nitpicky = True
 
-# Markdown: headings have the anchors that code hosts give them; pictures stand in <img>, for their width
+# Markdown: headings have the anchors that code hosts give them; pictures stand in <img>, for their
+# width
 myst_heading_anchors = 6
 myst_enable_extensions = ["html_image"]
 # tables copied into a page have headings of their own level
 suppress_warnings = ["myst.header"]
 
-# Every notebook runs anew: one that raises stops the build.  No cache: its age would decide what is shown.
+# Every notebook runs anew: one that raises stops the build.  No cache: its age would decide what is
+# shown.
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True
 nb_execution_timeout = 600  # s for a cell: ends one that hangs
-# The notebooks' kernels inherit it.  A calibration, of small matrices, takes 2.4 s of processor time with it.  Without
-# it takes 30 s where other processes are at work: threads of linear algebra wait for each other in busy loops.
+# The notebooks' kernels inherit it.  A calibration, of small matrices, takes 2.4 s of processor
+# time with it.  Without it takes 30 s where other processes are at work: threads of linear algebra
+# wait for each other in busy loops.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # Signatures without types: the docstrings have them in words.
@@ -60,8 +65,8 @@ autodoc_member_order = "bysource"
 python_maximum_signature_line_length = 88
 autosummary_generate_overwrite = True
 numpydoc_show_class_members = False  # the template of classes lists them
-# The parts that the docstring of every public object has.  Parameters that a function shares with `sweep` are
-# described there (so not PR01).
+# The parts that the docstring of every public object has.  Parameters that a function shares with
+# `sweep` are described there (so not PR01).
 numpydoc_validation_checks = {"GL08", "SS01", "SS03", "PR02", "PR07", "RT01", "SA01", "EX01"}
 numpydoc_validation_exclude = {r"\.\w+\.\w+$"}  # methods and attributes
 

@@ -7,17 +7,20 @@ from collections.abc import Iterator
 
 import pytest
 
-# before NumPy is loaded: its linear algebra waits for its threads in busy loops, which costs ten times the work
-# where each core has a process of the suite already
+# before NumPy is loaded: its linear algebra waits for its threads in busy loops, which costs ten
+# times the work where each core has a process of the suite already
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-# a collection of garbage goes through all that numba and Matplotlib have made: a twentieth of the suite's time
+# a collection of garbage goes through all that numba and Matplotlib have made: a twentieth of the
+# suite's time
 gc.set_threshold(100_000, 20, 20)
 
-# each process that a test starts would compile all sources of the program anew, which is a fifth of its time
+# each process that a test starts would compile all sources of the program anew, which is a fifth of
+# its time
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
-# a suite started in the background ignores Ctrl-C, and so would every process it starts to interrupt
+# a suite started in the background ignores Ctrl-C, and so would every process it starts to
+# interrupt
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 

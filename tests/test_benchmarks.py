@@ -29,7 +29,9 @@ SLOW = ("large_sweeps", "faults")
 
 
 @pytest.mark.filterwarnings("ignore")  # of the packages compared with
-@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow if n in SLOW else ()) for n in WRITES])
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.slow if n in SLOW else ()) for n in WRITES]
+)
 def test_runs_and_writes(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if name == "records":
         pytest.importorskip("pynewmarkdisp")  # of the extra `bench`
@@ -47,10 +49,21 @@ def test_other_waves_of_the_papers_peaks() -> None:
     """The tutorial quotes what a sweep gives of the stick-slip experiment."""
     harmonics = slipsweep.Harmonics((1.0, 0.3), (1, 3), (0.0, 180.0), cycles=5)
     waves = [harmonics, slipsweep.Triangle(5), slipsweep.Sine(5), slipsweep.Square(5)]
-    text = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8").split("## Other waves of the same peaks")[1]
+    text = (
+        (ROOT / "docs" / "tutorial.md")
+        .read_text(encoding="utf-8")
+        .split("## Other waves of the same peaks")[1]
+    )
     for wave in waves:
         found = slipsweep.sweep(
-            5.0, 0.38, 3.55, 1.8, yield_acceleration=0.59, decay_rate=2.70, delta_mu=0.09, excitation=wave
+            5.0,
+            0.38,
+            3.55,
+            1.8,
+            yield_acceleration=0.59,
+            decay_rate=2.70,
+            delta_mu=0.09,
+            excitation=wave,
         )
         moved = 1000 * found.permanent_displacement.item()
         quoted = f"{moved:.0f} mm and {found.peak_relative_velocity.item():.3f} m/s"
@@ -64,6 +77,10 @@ def test_the_sample_is_the_references() -> None:
 
     for groups in sample.read().values():
         group = groups[-1]
-        inputs = {name: float(values[0]) for name, values in group.inputs.items() if values[0] == values[0]}
+        inputs = {
+            name: float(values[0])
+            for name, values in group.inputs.items()
+            if values[0] == values[0]
+        }
         answer = solve(**inputs, model=group.model, cycles=1)  # type: ignore[arg-type]
         assert float(answer.permanent_displacement) == group.reference[0]

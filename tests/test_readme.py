@@ -28,10 +28,18 @@ from tests.support.commands import command, working_folder
 
 ROOT = Path(__file__).parents[1]
 
-PAGES = sorted(page.relative_to(ROOT).as_posix() for page in (*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")))
+PAGES = sorted(
+    page.relative_to(ROOT).as_posix() for page in (*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"))
+)
 
 #: Pages whose blocks are of files, kernels and machines that only a reader has.
-NOT_RUN = ("CONTRIBUTING.md", "docs/records.md", "docs/scaling.md", "docs/suites.md", "docs/waveforms.md")
+NOT_RUN = (
+    "CONTRIBUTING.md",
+    "docs/records.md",
+    "docs/scaling.md",
+    "docs/suites.md",
+    "docs/waveforms.md",
+)
 
 
 class Block(NamedTuple):
@@ -51,7 +59,9 @@ def blocks(document: str) -> list[Block]:
     text = read(document)
     return [
         Block(match[2], text.count("\n", 0, match.start(2)) + 1, match[3], match[1] or "")
-        for match in re.finditer(r"(?:^<!-- file: (\S+) -->\n)?^```(\w+)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+        for match in re.finditer(
+            r"(?:^<!-- file: (\S+) -->\n)?^```(\w+)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL
+        )
     ]
 
 
@@ -93,7 +103,13 @@ def commands(console: str) -> Iterator[tuple[list[str], str]]:
 def output_of(arguments: list[str], folder: Path) -> str:
     environment = {**os.environ, "MPLBACKEND": "agg", "PYTHONUTF8": "1"}
     done = subprocess.run(
-        arguments, cwd=folder, env=environment, capture_output=True, encoding="utf-8", timeout=300, check=False
+        arguments,
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        encoding="utf-8",
+        timeout=300,
+        check=False,
     )
     assert (done.returncode, done.stderr) == (0, "")
     return done.stdout
@@ -102,7 +118,8 @@ def output_of(arguments: list[str], folder: Path) -> str:
 def printed_by(text: str, where: str, folder: Path) -> str:
     """What a reader's program prints, run in this process, which has imported everything already."""
     assert "slipsweep." not in text or "import slipsweep" in text, where
-    output, errors = io.StringIO(), io.StringIO()
+    output = io.StringIO()
+    errors = io.StringIO()
     with (
         working_folder(folder),
         contextlib.redirect_stdout(output),
@@ -111,7 +128,12 @@ def printed_by(text: str, where: str, folder: Path) -> str:
     ):
         # all that Python would show
         warnings.simplefilter("error")
-        for hidden in (DeprecationWarning, PendingDeprecationWarning, ImportWarning, ResourceWarning):
+        for hidden in (
+            DeprecationWarning,
+            PendingDeprecationWarning,
+            ImportWarning,
+            ResourceWarning,
+        ):
             warnings.simplefilter("ignore", hidden)
         exec(compile(text, where, "exec"), {"__name__": "__main__"})
     assert errors.getvalue() == "", where
@@ -119,7 +141,9 @@ def printed_by(text: str, where: str, folder: Path) -> str:
 
 
 @pytest.mark.usefixtures("without_layout")
-@pytest.mark.parametrize("document", [page for page in PAGES if page not in NOT_RUN and "\n```" in read(page)])
+@pytest.mark.parametrize(
+    "document", [page for page in PAGES if page not in NOT_RUN and "\n```" in read(page)]
+)
 def test_blocks_do_what_they_say(document: str, tmp_path: Path) -> None:
     """The blocks of a document, in order, in one folder that holds what a clone holds."""
     run_blocks(document, blocks(document), tmp_path)
@@ -150,7 +174,9 @@ def run_blocks(document: str, found: list[Block], tmp_path: Path) -> None:
                     printed = output_of([path, *arguments], tmp_path)
                 else:
                     continue  # a program of others, not on this machine
-                assert re.fullmatch(pattern(expected), printed, re.DOTALL), f"{where} printed:\n{printed}"
+                assert re.fullmatch(pattern(expected), printed, re.DOTALL), (
+                    f"{where} printed:\n{printed}"
+                )
         elif block.language == "python":
             printed = printed_by(block.text, where, tmp_path)
             assert printed == (after.text if after and after.language == "text" else ""), where
@@ -189,7 +215,9 @@ def test_the_two_commands_of_the_readme() -> None:
 
 def test_figures_are_those_of_the_report() -> None:
     """.ci/include-report copies the files of benchmarks/results into the pages that quote them."""
-    done = subprocess.run([sys.executable, ROOT / ".ci" / "include-report", "--check"], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, ROOT / ".ci" / "include-report", "--check"], capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr
 
 
@@ -208,28 +236,53 @@ def test_links_lead_somewhere(document: str) -> None:
 
 # ------------------------------------------------------------------------ against the paper
 
-STICK_SLIP: dict[str, Any] = {"theta": 5.0, "mu_s": 0.38, "amplitude": 3.55, "yield_acceleration": 0.59}
-CONTINUOUS: dict[str, Any] = {"theta": 6.0, "mu_s": 0.38, "amplitude": 5.10, "yield_acceleration": 0.08}
+STICK_SLIP: dict[str, Any] = {
+    "theta": 5.0,
+    "mu_s": 0.38,
+    "amplitude": 3.55,
+    "yield_acceleration": 0.59,
+}
+CONTINUOUS: dict[str, Any] = {
+    "theta": 6.0,
+    "mu_s": 0.38,
+    "amplitude": 5.10,
+    "yield_acceleration": 0.08,
+}
 
 
 def five_cycles(experiment: dict[str, Any], frequency: float, **friction: Any) -> tuple[str, str]:
     """Displacement in mm and peak velocity in m/s, as the tutorial prints them."""
-    result = slipsweep.sweep(**experiment, frequency=frequency, **friction, excitation=slipsweep.Sine(cycles=5))
-    return f"{result.permanent_displacement.item() * 1000:.0f}", f"{result.peak_relative_velocity.item():.3f}"
+    result = slipsweep.sweep(
+        **experiment, frequency=frequency, **friction, excitation=slipsweep.Sine(cycles=5)
+    )
+    return (
+        f"{result.permanent_displacement.item() * 1000:.0f}",
+        f"{result.peak_relative_velocity.item():.3f}",
+    )
 
 
 def test_comparison_with_the_paper() -> None:
     table = rows(section("docs/tutorial.md", "## Against the paper"))[1:]
-    stated = {re.sub(r"\W+", " ", row[0]).strip(): (row[2].strip("*"), row[4].strip("*")) for row in table}
+    stated = {
+        re.sub(r"\W+", " ", row[0]).strip(): (row[2].strip("*"), row[4].strip("*")) for row in table
+    }
     assert len(stated) == len(table) == 10
 
     def eqs(name: str) -> tuple[str, ...]:
-        cells = (slipsweep.friction_parameters(**experiment)[name] for experiment in (STICK_SLIP, CONTINUOUS))
+        cells = (
+            slipsweep.friction_parameters(**experiment)[name]
+            for experiment in (STICK_SLIP, CONTINUOUS)
+        )
         return tuple(f"{cell.item():.2f}" for cell in cells)
 
-    history = slipsweep.simulate(**STICK_SLIP, frequency=1.8, decay_rate=2.70, excitation=slipsweep.Sine(cycles=1))
+    history = slipsweep.simulate(
+        **STICK_SLIP, frequency=1.8, decay_rate=2.70, excitation=slipsweep.Sine(cycles=1)
+    )
     attenuation = history.block_acceleration.max().item() / 9.81
-    printed = five_cycles(STICK_SLIP, 1.8, decay_rate=2.70), five_cycles(CONTINUOUS, 3.5, decay_rate=2.30)
+    printed = (
+        five_cycles(STICK_SLIP, 1.8, decay_rate=2.70),
+        five_cycles(CONTINUOUS, 3.5, decay_rate=2.30),
+    )
     own = five_cycles(STICK_SLIP, 1.8), five_cycles(CONTINUOUS, 3.5)
     computed = [
         eqs("limiting_acceleration"),
@@ -248,8 +301,13 @@ def test_comparison_with_the_paper() -> None:
 def test_numbers_of_the_paper_sweep() -> None:
     """340 mm and 0.299 m/s, 162 mm and 0.227 m/s: with the rounded friction above static of Table 2."""
     text = " ".join(section("docs/tutorial.md", "## Against the paper").split())
-    for experiment, frequency, decay_rate, delta_mu in ((STICK_SLIP, 1.8, 2.70, 0.09), (CONTINUOUS, 3.5, 2.30, 0.11)):
-        displacement, velocity = five_cycles(experiment, frequency, decay_rate=decay_rate, delta_mu=delta_mu)
+    for experiment, frequency, decay_rate, delta_mu in (
+        (STICK_SLIP, 1.8, 2.70, 0.09),
+        (CONTINUOUS, 3.5, 2.30, 0.11),
+    ):
+        displacement, velocity = five_cycles(
+            experiment, frequency, decay_rate=decay_rate, delta_mu=delta_mu
+        )
         assert f"{displacement} mm and {velocity} m/s" in text
     estimated = slipsweep.sweep(**STICK_SLIP, frequency=1.8, excitation=slipsweep.Sine(cycles=5))
     assert int(estimated.validity) == Validity.NOT_RECOUPLED | Validity.FRICTION_ESTIMATED
@@ -259,21 +317,41 @@ def test_numbers_of_the_paper_sweep() -> None:
 
 
 @pytest.mark.parametrize(
-    ("document", "heading"), [("docs/files.md", "## What the numbers mean"), ("docs/model.md", "## Validity")]
+    ("document", "heading"),
+    [("docs/files.md", "## What the numbers mean"), ("docs/model.md", "## Validity")],
 )
 def test_flags_are_those_of_the_program(document: str, heading: str) -> None:
-    stated = [(int(bit), name.strip("`"), kind) for bit, name, kind, _ in rows(section(document, heading))[1:]]
+    stated = [
+        (int(bit), name.strip("`"), kind)
+        for bit, name, kind, _ in rows(section(document, heading))[1:]
+    ]
     assert stated == [(int(flag), (flag.name or "").lower(), str(flag.kind)) for flag in Validity]
 
 
 @pytest.mark.parametrize(
     "heading",
-    ["[axes.NAME]", "[[cases]]", "[model]", "[excitation]", "[solver]", "[output]", "[uncertainty]"],
+    [
+        "[axes.NAME]",
+        "[[cases]]",
+        "[model]",
+        "[excitation]",
+        "[solver]",
+        "[output]",
+        "[uncertainty]",
+    ],
 )
 def test_keys_are_those_of_the_schema(heading: str) -> None:
     table = heading.strip("[]")
-    keys = {row[0].strip("`"): row for row in rows(section("docs/sweep-files.md", f"## `{heading}`")) if len(row) == 4}
-    axes = {name: keys.pop(name) for name in list(keys) if table == "axes.NAME" and name in spec.KEYS["axes"]}
+    keys = {
+        row[0].strip("`"): row
+        for row in rows(section("docs/sweep-files.md", f"## `{heading}`"))
+        if len(row) == 4
+    }
+    axes = {
+        name: keys.pop(name)
+        for name in list(keys)
+        if table == "axes.NAME" and name in spec.KEYS["axes"]
+    }
     assert list(keys) == ["key", *spec.KEYS[table]] + (["NAME"] if axes else [])
     if axes:
         assert list(axes) == list(spec.KEYS["axes"])

@@ -43,6 +43,8 @@ class RunError(RuntimeError):
 
 def did_you_mean(word: str, known: Sequence[str]) -> str:
     """Suggest the nearest known name, or tell all of them."""
-    near = [one for one in known if len(word) > 3 and word in one] or difflib.get_close_matches(word, known, n=1)
+    near = [one for one in known if len(word) > 3 and word in one] or difflib.get_close_matches(
+        word, known, n=1
+    )
     quoted = " or ".join(f'"{one}"' for one in near)
     return f"did you mean {quoted}?" if near else f"known here: {', '.join(known)}"

@@ -1,9 +1,9 @@
 """Make shaking_test.csv, a made-up test on a shaking table: run ``python sweeps/data/shaking_test.py``.
 
-A block on a plane of 5 degrees (static friction 0.38) in stick-slip: what `slipsweep.simulate` gives for Üy = 1.8 m/s²,
-λ = 2 and Δμ = 0.1 under eight cycles of 2 Hz and 5 m/s², between rests of half a second, 200 times a second; with white
-noise of 2 % of each channel's peak, and as a converter of 12 bits gives it.  Nobody measured it: it is here to
-try calibration with.
+A block on a plane of 5 degrees (static friction 0.38) in stick-slip: what `slipsweep.simulate`
+gives for Üy = 1.8 m/s², λ = 2 and Δμ = 0.1 under eight cycles of 2 Hz and 5 m/s², between rests of
+half a second, 200 times a second; with white noise of 2 % of each channel's peak, and as a
+converter of 12 bits gives it.  Nobody measured it: it is here to try calibration with.
 """
 
 from pathlib import Path
@@ -12,8 +12,13 @@ import numpy as np
 
 import slipsweep
 
-RATE, REST, CYCLES, FREQUENCY = 200, 0.5, 8, 2.0
-NOISE, BITS, SEED = 0.02, 12, 2012
+RATE = 200
+REST = 0.5
+CYCLES = 8
+FREQUENCY = 2.0
+NOISE = 0.02
+BITS = 12
+SEED = 2012
 COLUMNS = {
     "ground_acceleration": ("table acceleration (g)", 9.80665),
     "block_acceleration": ("block acceleration (g)", 9.80665),
@@ -32,9 +37,16 @@ def text() -> str:
     times = np.arange(round((2 * REST + CYCLES / FREQUENCY) * RATE) + 1) / RATE
     moving = times >= REST
     history = slipsweep.simulate(
-        5.0, 0.38, 5.0, FREQUENCY, yield_acceleration=1.8, decay_rate=2.0, delta_mu=0.1,
-        excitation=slipsweep.Sine(cycles=CYCLES), times=times[moving] - REST,
-    )  # fmt: skip
+        5.0,
+        0.38,
+        5.0,
+        FREQUENCY,
+        yield_acceleration=1.8,
+        decay_rate=2.0,
+        delta_mu=0.1,
+        excitation=slipsweep.Sine(cycles=CYCLES),
+        times=times[moving] - REST,
+    )
     generator = np.random.default_rng(SEED)
     columns = [times]
     for name in COLUMNS:
@@ -42,11 +54,18 @@ def text() -> str:
         values[moving] = history[name].values
         peak = np.abs(values).max()
         step = 2.5 * peak / 2**BITS
-        columns.append(np.round((values + NOISE * peak * generator.standard_normal(times.size)) / step) * step)
+        columns.append(
+            np.round((values + NOISE * peak * generator.standard_normal(times.size)) / step) * step
+        )
     scales = [1.0, *(scale for _, scale in COLUMNS.values())]
     names = ",".join(["time (s)", *(name for name, _ in COLUMNS.values())])
-    rows = zip(*(values / scale for values, scale in zip(columns, scales, strict=True)), strict=True)
-    lines = (",".join([f"{row[0]:.3f}", *(f"{value + 0.0:.5g}" for value in row[1:])]) + "\n" for row in rows)
+    rows = zip(
+        *(values / scale for values, scale in zip(columns, scales, strict=True)), strict=True
+    )
+    lines = (
+        ",".join([f"{row[0]:.3f}", *(f"{value + 0.0:.5g}" for value in row[1:])]) + "\n"
+        for row in rows
+    )
     return f"{HEADER}{names}\n" + "".join(lines)
 
 

@@ -1,10 +1,11 @@
 """Make the files in suite/, a made-up suite of accelerograms: run ``python sweeps/data/suite.py``.
 
-Four motions of two horizontal components each, as sums of cosines with random phases whose power spectrum is that of
-Kanai and Tajimi (as ``synthetic.py`` beside this file), under an envelope that rises as t², stays and decays.  Ground
-frequency, damping, duration, interval and peak differ from motion to motion; the third has a velocity pulse, as
-motions near a fault have.  A straight line under the envelope is taken off, so that each ends at rest, where it began.
-Nobody recorded them: they are here to try the program with, not to design by.
+Four motions of two horizontal components each, as sums of cosines with random phases whose power
+spectrum is that of Kanai and Tajimi (as ``synthetic.py`` beside this file), under an envelope that
+rises as t², stays and decays.  Ground frequency, damping, duration, interval and peak differ from
+motion to motion; the third has a velocity pulse, as motions near a fault have.  A straight line
+under the envelope is taken off, so that each ends at rest, where it began. Nobody recorded them:
+they are here to try the program with, not to design by.
 """
 
 from dataclasses import dataclass
@@ -54,17 +55,24 @@ def acceleration(motion: Motion, component: int) -> NDArray[np.float64]:
     frequencies = np.arange(1, 401) * 0.05 + 0.1
     ratio = (frequencies / motion.ground_frequency) ** 2
     soil = (1 + 4 * motion.damping**2 * ratio) / ((1 - ratio) ** 2 + 4 * motion.damping**2 * ratio)
-    low = (frequencies / 0.25) ** 4 / ((1 - (frequencies / 0.25) ** 2) ** 2 + 4 * 0.6**2 * (frequencies / 0.25) ** 2)
+    low = (frequencies / 0.25) ** 4 / (
+        (1 - (frequencies / 0.25) ** 2) ** 2 + 4 * 0.6**2 * (frequencies / 0.25) ** 2
+    )
     random = np.random.default_rng([SEED, MOTIONS.index(motion), component])
-    angles = 2.0 * np.pi * frequencies[:, None] * times + random.uniform(0.0, 2.0 * np.pi, (frequencies.size, 1))
+    angles = 2.0 * np.pi * frequencies[:, None] * times + random.uniform(
+        0.0, 2.0 * np.pi, (frequencies.size, 1)
+    )
     noise = (np.sqrt(soil * low)[:, None] * np.cos(angles)).sum(axis=0)
     decay = 3.0 / (motion.duration - motion.strong)
-    envelope = np.minimum(times / 2.0, 1.0) ** 2 * np.exp(-decay * np.maximum(times - motion.strong, 0.0))
+    envelope = np.minimum(times / 2.0, 1.0) ** 2 * np.exp(
+        -decay * np.maximum(times - motion.strong, 0.0)
+    )
     values = noise * envelope / np.abs(noise * envelope).max()
     if motion.pulse and component == 0:
         phase = np.clip((times - 0.5 * motion.strong) / motion.pulse, -1.0, 1.0)
         values = 0.6 * values + np.sin(np.pi * phase) * (1 + np.cos(np.pi * phase)) / 1.3
-    # velocity and displacement at the end, by the trapezoidal rule and its integral, are those of two such terms
+    # velocity and displacement at the end, by the trapezoidal rule and its integral, are those of
+    # two such terms
     terms = np.array([envelope, envelope * (times / motion.duration - 0.5)])
     ends = np.array([_end(row, motion.interval) for row in (values, *terms)])
     values = values - np.linalg.solve(ends[1:].T, ends[0]) @ terms
@@ -85,7 +93,10 @@ def texts() -> dict[str, str]:
         for component in (0, 1):
             values = acceleration(motion, component)
             header = HEADER.format(
-                name=motion.name, component=component + 1, points=values.size, interval=motion.interval
+                name=motion.name,
+                component=component + 1,
+                points=values.size,
+                interval=motion.interval,
             )
             numbers = [f"{value:10.5f}".replace("-0.00000", " 0.00000") for value in values]
             rows = ("".join(numbers[at : at + 8]) + "\n" for at in range(0, values.size, 8))

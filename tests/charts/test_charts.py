@@ -36,13 +36,17 @@ LINED_SINE = slipsweep.Sine(cycles=15)
 
 @pytest.fixture(scope="module")
 def grid() -> xr.Dataset:
-    return slipsweep.sweep(np.arange(0, 21, 2.0), [0.2, 0.3, 0.45, 0.6], AMPLITUDES, FREQUENCIES, excitation=SINE)
+    return slipsweep.sweep(
+        np.arange(0, 21, 2.0), [0.2, 0.3, 0.45, 0.6], AMPLITUDES, FREQUENCIES, excitation=SINE
+    )
 
 
 @pytest.fixture(scope="module")
 def lined() -> xr.Dataset:
     amplitudes = np.linspace(0.02, 0.8, 40) * 9.81
-    return slipsweep.sweep([8.0, 11.0, 14.0], [0.25, 0.35, 0.45], amplitudes, [0.5, 1, 2], excitation=LINED_SINE)
+    return slipsweep.sweep(
+        [8.0, 11.0, 14.0], [0.25, 0.35, 0.45], amplitudes, [0.5, 1, 2], excitation=LINED_SINE
+    )
 
 
 @pytest.fixture(scope="module")
@@ -86,14 +90,21 @@ def inside(area: Any, cells: Any) -> Any:
 # -------------------------------------------------------------------------- lines and contours
 
 
-@pytest.mark.parametrize(("x", "y"), [("frequency", "amplitude"), ("theta", "amplitude"), ("amplitude", "theta")])
-def test_lines_of_yield_and_mode_limit_lie_where_the_equations_put_them(grid: xr.Dataset, x: str, y: str) -> None:
+@pytest.mark.parametrize(
+    ("x", "y"), [("frequency", "amplitude"), ("theta", "amplitude"), ("amplitude", "theta")]
+)
+def test_lines_of_yield_and_mode_limit_lie_where_the_equations_put_them(
+    grid: xr.Dataset, x: str, y: str
+) -> None:
     at = {"theta": 6, "mu_s": 0.3} if x == "frequency" else {"frequency": 1, "mu_s": 0.3}
     figure = grid.slipsweep.chart("modes", x=x, y=y, at=at)
     other = x if y == "amplitude" else y
     thetas = 6.0 if other == "frequency" else grid.theta.values
     expected = slipsweep.friction_parameters(thetas, 0.3, 1.0)
-    for gid, name in (("yield_line", "yield_acceleration"), ("limit_line", "limiting_acceleration")):
+    for gid, name in (
+        ("yield_line", "yield_acceleration"),
+        ("limit_line", "limiting_acceleration"),
+    ):
         (line,) = named(figure, gid)
         vertices = np.concatenate(line.allsegs[0])
         along, values = vertices.T if y == "amplitude" else vertices.T[::-1]
@@ -106,7 +117,9 @@ def test_lines_of_yield_and_mode_limit_lie_where_the_equations_put_them(grid: xr
 
 def test_lines_over_a_displacement_amplitude() -> None:
     """A = ω²d: on the line of yield d = Üy/ω²."""
-    result = slipsweep.sweep(5.0, 0.4, displacement_amplitude=np.linspace(0.01, 0.4, 23), frequency=[1.0, 2.0, 4.0])
+    result = slipsweep.sweep(
+        5.0, 0.4, displacement_amplitude=np.linspace(0.01, 0.4, 23), frequency=[1.0, 2.0, 4.0]
+    )
     (line,) = named(result.slipsweep.chart("contours"), "yield_line")
     threshold = slipsweep.friction_parameters(5.0, 0.4, 1.0).yield_acceleration.item()
     frequencies, amplitudes = np.concatenate(line.allsegs[0]).T
@@ -128,8 +141,12 @@ def test_contours_lie_where_the_displacement_is_their_level(grid: xr.Dataset) ->
             # between rows the amplitude is interpolated too
             rows = every[np.isclose(every[:, 1:], AMPLITUDES).any(axis=1)][::5]
             for frequency, amplitude in rows:
-                exact = slipsweep.sweep(6.0, 0.45, amplitude, frequency, excitation=SINE).permanent_displacement
-                assert exact.item() == pytest.approx(10**level, rel=0.02)  # straight in f between points
+                exact = slipsweep.sweep(
+                    6.0, 0.45, amplitude, frequency, excitation=SINE
+                ).permanent_displacement
+                assert exact.item() == pytest.approx(
+                    10**level, rel=0.02
+                )  # straight in f between points
             checked += len(rows)
     assert checked > 20
 
@@ -159,12 +176,20 @@ def test_hatching_is_where_validity_says_so(grid: xr.Dataset, x: str) -> None:
     mesh = np.stack(np.meshgrid(grid[x], grid.amplitude), axis=-1).reshape(-1, 2)
     seen = 0
     for flag in ~NOTES:
-        expected, name = (cells.values & int(flag)) != 0, (flag.name or "").lower()
-        patches, small = named(figure, name), re.search(rf"{name} \((\d+) cell", caption(figure))
+        expected = (cells.values & int(flag)) != 0
+        name = (flag.name or "").lower()
+        patches = named(figure, name)
+        small = re.search(rf"{name} \((\d+) cell", caption(figure))
         left = int(small[1]) if small else 0
-        covered = inside(patches[0], mesh).reshape(cells.shape) if patches else np.zeros(cells.shape, bool)
+        covered = (
+            inside(patches[0], mesh).reshape(cells.shape)
+            if patches
+            else np.zeros(cells.shape, bool)
+        )
         assert not (covered & ~expected).any()
-        assert covered.sum() + left == expected.sum()  # regions too small for a hatch are counted in the caption
+        assert (
+            covered.sum() + left == expected.sum()
+        )  # regions too small for a hatch are counted in the caption
         assert all(patch.hatches[0] for patch in patches)
         seen += covered.sum()
     assert seen > 0
@@ -177,14 +202,23 @@ def test_all_flags_but_notes_have_a_hatch_of_their_own() -> None:
 
 def test_what_no_block_does_is_marked_and_its_share_told(lined: xr.Dataset) -> None:
     """Displacements that fall with A, or lie below half of Newmark's: against sweeps of this test's own."""
-    given: dict[str, Any] = {"theta": 14.0, "mu_s": 0.25, "frequency": 1.0, "excitation": LINED_SINE}
+    given: dict[str, Any] = {
+        "theta": 14.0,
+        "mu_s": 0.25,
+        "frequency": 1.0,
+        "excitation": LINED_SINE,
+    }
     amplitudes = lined.amplitude.values
     ours = slipsweep.sweep(amplitude=amplitudes, **given)
     before = slipsweep.sweep(amplitude=amplitudes * 0.99, **given).permanent_displacement.values
-    theirs = slipsweep.sweep(amplitude=amplitudes, model="newmark", **given).permanent_displacement.values
-    u, flags = ours.permanent_displacement.values, slipsweep.flags(ours)
+    theirs = slipsweep.sweep(
+        amplitude=amplitudes, model="newmark", **given
+    ).permanent_displacement.values
+    u = ours.permanent_displacement.values
+    flags = slipsweep.flags(ours)
     shown = (u > 0) & ~flags.not_recoupled.values
-    falls, below = shown & (u < before), shown & (u < theirs / 2)
+    falls = shown & (u < before)
+    below = shown & (u < theirs / 2)
     assert falls.any()
     assert below.any()
     figure = lined.slipsweep.chart("curve", at={"theta": 14, "mu_s": 0.25, "frequency": 1})
@@ -198,18 +232,27 @@ def test_what_no_block_does_is_marked_and_its_share_told(lined: xr.Dataset) -> N
     (patch,) = named(ratio, style.UNSOUND)
     cells = np.stack([np.full_like(amplitudes, 14.0), amplitudes], axis=-1)
     np.testing.assert_array_equal(inside(patch, cells), falls | below)
-    sound = slipsweep.sweep(5.0, 0.4, [2.0, 4.0, 6.0], 1.0, model="newmark").slipsweep.chart("curve")
+    sound = slipsweep.sweep(5.0, 0.4, [2.0, 4.0, 6.0], 1.0, model="newmark").slipsweep.chart(
+        "curve"
+    )
     assert "falls with A" not in caption(sound)
 
 
 def test_shares_of_what_is_unsound_are_those_of_all_cells() -> None:
     """Of some 300 000 cells half are counted: to a percent or two what all of them say, on axes long and short."""
-    axes = (np.linspace(0, 20, 11), np.linspace(0.2, 0.9, 8), np.geomspace(0.5, 14, 61), np.geomspace(0.1, 20, 58))
+    axes = (
+        np.linspace(0, 20, 11),
+        np.linspace(0.2, 0.9, 8),
+        np.geomspace(0.5, 14, 61),
+        np.geomspace(0.1, 20, 58),
+    )
     result = slipsweep.sweep(*axes)
     slides = result.permanent_displacement.where(~slipsweep.flags(result).not_recoupled) > 0
     estimated = slides & (result.sliding_mode == 2) & slipsweep.flags(result).friction_estimated
     trends, continuous = solved.unsound_texts(result)
-    share, counted = re.findall(r"^([\d.]+) % .* \(counted in (\d+) cells, evenly spaced\)$", continuous)[0]
+    share, counted = re.findall(
+        r"^([\d.]+) % .* \(counted in (\d+) cells, evenly spaced\)$", continuous
+    )[0]
     assert abs(float(share) - 100 * float(estimated.sum() / slides.sum())) < 1.5
     assert 100_000 < int(counted) < 250_000
     assert trends.startswith("the displacement falls with A in ")
@@ -233,16 +276,28 @@ def test_one_curve_has_newmarks_beside(grid: xr.Dataset, lined: xr.Dataset) -> N
         np.testing.assert_allclose(ys[on_grid], ours[np.isin(grid[x], xs[on_grid])], rtol=1e-12)
         assert on_grid.sum() > 10
         (line,) = named(figure, "newmark")
-        np.testing.assert_allclose(line.get_ydata(), np.where(theirs > 0, theirs, np.nan), rtol=1e-12)
-        lines = {"yield": "yield_line", "mode limit (Eq. 7)": "limit_line"} if x == "amplitude" else {}
+        np.testing.assert_allclose(
+            line.get_ydata(), np.where(theirs > 0, theirs, np.nan), rtol=1e-12
+        )
+        lines = (
+            {"yield": "yield_line", "mode limit (Eq. 7)": "limit_line"} if x == "amplitude" else {}
+        )
         assert {*legend(figure)} >= {"Newmark's block", *lines}
         marks = [line.get_xdata()[0] for gid in lines.values() for line in named(figure, gid)]
-        assert marks == pytest.approx([3.2306287100, 7.9326887206] if lines else [])  # g tan(φ − θ), Eq. 7
+        assert marks == pytest.approx(
+            [3.2306287100, 7.9326887206] if lines else []
+        )  # g tan(φ − θ), Eq. 7
 
 
-def test_newmarks_block_over_its_yield_coefficient(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_newmarks_block_over_its_yield_coefficient(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     ky = np.linspace(0.05, 0.4, 8)
-    given: dict[str, Any] = {"amplitude": np.linspace(1, 6, 11), "frequency": [0.5, 1, 2], "model": "newmark"}
+    given: dict[str, Any] = {
+        "amplitude": np.linspace(1, 6, 11),
+        "frequency": [0.5, 1, 2],
+        "model": "newmark",
+    }
     result = slipsweep.sweep(yield_coefficient=ky, **given)
     result.to_netcdf("ky.nc")
     assert main(["chart", "ky.nc"]) == 0
@@ -250,7 +305,9 @@ def test_newmarks_block_over_its_yield_coefficient(here: Path, capsys: pytest.Ca
         f"ky-{kind}.png" for kind in ("contours", "modes", "families", "dimensionless")
     ]
     assert main(["report", "ky.nc"]) == 0
-    assert Path("ky.pdf").read_bytes().count(b"/Type /Page ") == 1 + 4  # no ratio of Newmark's block to itself
+    assert (
+        Path("ky.pdf").read_bytes().count(b"/Type /Page ") == 1 + 4
+    )  # no ratio of Newmark's block to itself
     for at in ({"amplitude": 3.0, "frequency": 1}, {"ky": ky[2], "frequency": 1}):
         figure = result.slipsweep.chart(at=at)
         expected = result.permanent_displacement.rename(yield_coefficient="ky").sel(at) * 1000
@@ -271,7 +328,9 @@ def test_the_dimensionless_chart_is_of_any_frequency(grid: xr.Dataset) -> None:
         for mu_s in (0.3, 0.6):
             onset = slipsweep.friction_parameters(6.0, mu_s, 1.0).yield_acceleration.item()
             found = dict(zip(*labelled(figure, f"μs = {mu_s:g}")[0].get_data(), strict=True))
-            u = grid.permanent_displacement.sel(theta=6, mu_s=mu_s, frequency=FREQUENCIES[12]).values
+            u = grid.permanent_displacement.sel(
+                theta=6, mu_s=mu_s, frequency=FREQUENCIES[12]
+            ).values
             ys = np.array([found[x] for x in AMPLITUDES / onset])
             there = np.isfinite(ys) & (ys > 0)
             expected = u * (2 * np.pi * FREQUENCIES[12]) ** 2 / AMPLITUDES
@@ -282,9 +341,14 @@ def test_the_dimensionless_chart_is_of_any_frequency(grid: xr.Dataset) -> None:
 def test_ratio_to_newmark_is_that_of_a_direct_sweep(lined: xr.Dataset) -> None:
     at = {"mu_s": 0.25, "frequency": 1}
     figure = lined.slipsweep.chart("contours", x="theta", at=at)
-    given: dict[str, Any] = {"theta": lined.theta.values, "mu_s": 0.25, "amplitude": lined.amplitude.values}
+    given: dict[str, Any] = {
+        "theta": lined.theta.values,
+        "mu_s": 0.25,
+        "amplitude": lined.amplitude.values,
+    }
     ours, theirs = (
-        slipsweep.sweep(**given, frequency=1.0, model=model, excitation=LINED_SINE) for model in ("mendez", "newmark")
+        slipsweep.sweep(**given, frequency=1.0, model=model, excitation=LINED_SINE)
+        for model in ("mendez", "newmark")
     )
     kept = slipsweep.flags(ours).not_recoupled.values == 0
     ratio = ours.permanent_displacement.values / theirs.permanent_displacement.values.clip(1e-300)
@@ -295,7 +359,9 @@ def test_ratio_to_newmark_is_that_of_a_direct_sweep(lined: xr.Dataset) -> None:
 
 
 def test_curves_break_at_the_mode_limit(grid: xr.Dataset) -> None:
-    figure = grid.slipsweep.chart("families", at={"theta": 6, "mu_s": 0.45, "frequency": (1.0, 5.0)})
+    figure = grid.slipsweep.chart(
+        "families", at={"theta": 6, "mu_s": 0.45, "frequency": (1.0, 5.0)}
+    )
     limit = slipsweep.friction_parameters(6.0, 0.45, 1.0).limiting_acceleration.item()
     beyond = int(np.searchsorted(AMPLITUDES, limit))
     for line, jump in zip(labelled(figure, "f = "), named(figure, "jump"), strict=True):
@@ -314,19 +380,31 @@ def test_values_that_are_unreliable_leave_a_gap(lined: xr.Dataset) -> None:
     for shown in (False, True):
         figure = lined.slipsweep.chart("families", at=at, show_cautions=shown)
         xs, ys = labelled(figure, "μs = 0.25")[0].get_data()
-        seen = [bool(np.isfinite(ys[xs == amplitude]).any()) for amplitude in direct.amplitude.values]
+        seen = [
+            bool(np.isfinite(ys[xs == amplitude]).any()) for amplitude in direct.amplitude.values
+        ]
         # a logarithmic axis has no place for upslope
         expected = ~flags.upslope.values if shown else ~(flags.not_recoupled | flags.upslope).values
         np.testing.assert_array_equal(seen, expected & (direct.permanent_displacement.values > 0))
         text = caption(figure)
         assert ("Drawn on request: values flagged not_recoupled" in text) == shown
-        assert ("Left out: values flagged not_recoupled (does not come to rest" in text) == (not shown)
-        (mark,) = [one for one in named(figure, "caution") if np.isfinite(one.get_ydata()).any()][:1]
+        assert ("Left out: values flagged not_recoupled (does not come to rest" in text) == (
+            not shown
+        )
+        (mark,) = [one for one in named(figure, "caution") if np.isfinite(one.get_ydata()).any()][
+            :1
+        ]
         assert mark.get_linewidth() > 5
     velocity = lined.slipsweep.chart(
-        "families", y="mu_s", at=at | {"mu_s": (0.25,)}, variable="peak_relative_velocity", show_cautions=True
+        "families",
+        y="mu_s",
+        at=at | {"mu_s": (0.25,)},
+        variable="peak_relative_velocity",
+        show_cautions=True,
     )
-    assert np.isfinite(labelled(velocity, "μs = 0.25")[0].get_ydata()[-1])  # of a block that ends upslope it is above 0
+    assert np.isfinite(
+        labelled(velocity, "μs = 0.25")[0].get_ydata()[-1]
+    )  # of a block that ends upslope it is above 0
 
 
 @pytest.mark.parametrize("kind", ["contours", "newmark"])
@@ -349,7 +427,12 @@ def test_a_single_point_is_barred_too_and_angles_are_not_logarithmic() -> None:
     figure.draw_without_rendering()
     label = figure.axes[0].yaxis.label.get_window_extent()
     assert label.y1 <= figure.legends[0].get_window_extent().y0
-    assert [solved.percent(share) for share in (1.0, 0.996, 0.054, 0.00312)] == ["100 %", "100 %", "5.4 %", "0.31 %"]
+    assert [solved.percent(share) for share in (1.0, 0.996, 0.054, 0.00312)] == [
+        "100 %",
+        "100 %",
+        "5.4 %",
+        "0.31 %",
+    ]
 
 
 def test_labels_of_panels_lie_apart(grid: xr.Dataset) -> None:
@@ -369,7 +452,9 @@ def test_spread_is_between_the_options_there_are(lined: xr.Dataset) -> None:
         model = slipsweep.Mendez(recoupling=recoupling)  # type: ignore[arg-type]
         expected[f"λ by Eq. 6, {text}"] = slipsweep.sweep(**given, model=model)
         for rate in (2.0, 3.0):
-            expected[f"λ = {rate:g}, {text}"] = slipsweep.sweep(**given, model=model, decay_rate=rate)
+            expected[f"λ = {rate:g}, {text}"] = slipsweep.sweep(
+                **given, model=model, decay_rate=rate
+            )
     expected["this result:\nλ by Eq. 6, stop by Eq. 12"] = expected["λ by Eq. 6, stop by Eq. 12"]
     rows = []
     for label, answer in expected.items():
@@ -397,8 +482,17 @@ def test_only_what_is_shown_is_read(path: Path, monkeypatch: pytest.MonkeyPatch)
         read.update({str(name): one.size for name, one in self.data_vars.items()})
         return original(self, **options)
 
-    # times 53 amplitudes: 25 frequencies, 11 angles, every sixth frequency, one, 4 coefficients of friction
-    curves = {"contours": 25, "modes": 11, "families": 5, "curve": 1, "dimensionless": 4, "newmark": 11, "spread": 1}
+    # times 53 amplitudes: 25 frequencies, 11 angles, every sixth frequency, one, 4 coefficients of
+    # friction
+    curves = {
+        "contours": 25,
+        "modes": 11,
+        "families": 5,
+        "curve": 1,
+        "dimensionless": 4,
+        "newmark": 11,
+        "spread": 1,
+    }
     monkeypatch.setattr(xr.Dataset, "load", counted)
     with slipsweep.open_result(path) as data:
         for kind, count in curves.items():
@@ -409,10 +503,14 @@ def test_only_what_is_shown_is_read(path: Path, monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.parametrize(("theta", "mu_s"), [(6.0, 0.45), (4.9, 0.45), (6.0, 0.37), (19.3, 0.59)])
-def test_slices_are_at_the_very_values_requested(grid: xr.Dataset, theta: float, mu_s: float) -> None:
+def test_slices_are_at_the_very_values_requested(
+    grid: xr.Dataset, theta: float, mu_s: float
+) -> None:
     """Where the result has none the slice is solved."""
     keep: dict[str, Any] = {"frequency": slice(None), "amplitude": slice(None)}
-    found = Result(grid, "grid").select(["permanent_displacement", "validity"], keep, {"theta": theta, "mu_s": mu_s})
+    found = Result(grid, "grid").select(
+        ["permanent_displacement", "validity"], keep, {"theta": theta, "mu_s": mu_s}
+    )
     direct = slipsweep.sweep(theta, mu_s, AMPLITUDES, FREQUENCIES, excitation=SINE)
     for name in ("theta", "mu_s", "permanent_displacement", "validity"):
         np.testing.assert_array_equal(found[name].transpose(*direct[name].dims), direct[name])
@@ -433,7 +531,10 @@ def test_values_on_axes_are_found_as_messages_print_them(grid: xr.Dataset) -> No
         assert {name: places.tolist() for name, places in found.items()} == expected
     assert find(result, {"mu_s": 0.3333})["mu_s"][0].index is None  # a number is what it is
     wrong: tuple[tuple[dict[str, Any], str], ...] = (
-        ({"frequency": "1.2"}, r"frequency = 1.2: not among the values of the result; its neighbours are 0.948683 and"),
+        (
+            {"frequency": "1.2"},
+            r"frequency = 1.2: not among the values of the result; its neighbours are 0.948683 and",
+        ),
         ({"frequency": "1200mHz"}, "frequency = 1.2: not among the values"),
         ({"theta": 6}, "theta = 6: outside the range of the result, 5 degree"),
         ({"thta": 5}, 'did you mean "theta"'),
@@ -446,7 +547,10 @@ def test_values_on_axes_are_found_as_messages_print_them(grid: xr.Dataset) -> No
 def test_values_that_nothing_lies_between_are_refused_with_their_neighbours() -> None:
     measured = xr.DataArray([0.5, 0.6, 0.7], dims="theta", coords={"theta": [0.0, 3.0, 6.0]})
     result = slipsweep.sweep([0.0, 3.0, 6.0], 0.4, [2.0, 3.0], 1.0, yield_acceleration=measured)
-    with pytest.raises(InputError, match=r"theta = 4: .*neighbours are 3 and 6 degree .yield_acceleration is known at"):
+    with pytest.raises(
+        InputError,
+        match=r"theta = 4: .*neighbours are 3 and 6 degree .yield_acceleration is known at",
+    ):
         result.slipsweep.chart("families", at={"theta": 4})
 
 
@@ -481,7 +585,9 @@ def test_acceleration_in_g(lined: xr.Dataset) -> None:
         expected = slipsweep.friction_parameters(lined.theta, 0.35, 1.0).yield_acceleration.values
         vertices = np.concatenate(named(figure, "yield_line")[0].allsegs[0])
         drawn = vertices[np.isin(vertices[:, 0], lined.theta), 1]
-        np.testing.assert_allclose(drawn, np.sort(expected)[::-1] / (9.81 if units == "g" else 1), rtol=1e-12)
+        np.testing.assert_allclose(
+            drawn, np.sort(expected)[::-1] / (9.81 if units == "g" else 1), rtol=1e-12
+        )
     modes = lined.slipsweep.chart("modes", x="theta", y="mu_s", at={"amplitude": "0.5g"}, units="g")
     assert "A = 0.5 g" in caption(modes)
 
@@ -498,7 +604,9 @@ def test_ratios_have_one_order_of_lightness() -> None:
 @pytest.mark.parametrize("kind", SWEEP_KINDS)
 def test_a_narrow_grey_chart_is_legible(lined: xr.Dataset, kind: str) -> None:
     """Nothing is cut off, no legend lies on the data, no entry is without its mark, and nothing has a colour."""
-    figure = lined.slipsweep.chart(kind, at={"mu_s": 0.25}, width=90 if kind == "modes" else "90mm", grey=True)
+    figure = lined.slipsweep.chart(
+        kind, at={"mu_s": 0.25}, width=90 if kind == "modes" else "90mm", grey=True
+    )
     figure.draw_without_rendering()
     width, height = figure.get_size_inches()
     assert width == pytest.approx(90 / 25.4)
@@ -511,7 +619,10 @@ def test_a_narrow_grey_chart_is_legible(lined: xr.Dataset, kind: str) -> None:
     for handle in figure.legends[0].legend_handles:
         assert handle is not None
         if isinstance(handle, Line2D):
-            assert handle.get_linestyle() not in ("", "None") or handle.get_marker() not in ("", "None")
+            assert handle.get_linestyle() not in ("", "None") or handle.get_marker() not in (
+                "",
+                "None",
+            )
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     assert np.ptp(np.asarray(canvas.buffer_rgba(), float)[..., :3], axis=-1).max() <= 2
@@ -519,7 +630,9 @@ def test_a_narrow_grey_chart_is_legible(lined: xr.Dataset, kind: str) -> None:
 
 @pytest.mark.parametrize("kind", ["contours", "newmark"])
 def test_a_grey_colour_bar_has_the_same_numbers(lined: xr.Dataset, kind: str) -> None:
-    bars = [lined.slipsweep.chart(kind, at={"mu_s": 0.25}, grey=grey).axes[-1] for grey in (False, True)]
+    bars = [
+        lined.slipsweep.chart(kind, at={"mu_s": 0.25}, grey=grey).axes[-1] for grey in (False, True)
+    ]
     coloured, grey = ([text.get_text() for text in bar.get_yticklabels()] for bar in bars)
     assert coloured == grey
     assert ("30 mm" if kind == "contours" else "3") in grey
@@ -547,7 +660,10 @@ def test_panels(lined: xr.Dataset, kind: str) -> None:
 
 def test_cases_tell_curves_and_panels_apart() -> None:
     result = slipsweep.sweep(
-        xr.DataArray([2.0, 12.0], dims="case"), xr.DataArray([0.4, 0.5], dims="case"), np.linspace(1, 12, 23), [1, 2, 4]
+        xr.DataArray([2.0, 12.0], dims="case"),
+        xr.DataArray([0.4, 0.5], dims="case"),
+        np.linspace(1, 12, 23),
+        [1, 2, 4],
     ).assign_coords(label=("case", ["gentle", "steep"]))
     figure = result.slipsweep.chart("families", y="case", at={"frequency": 2})
     (line,) = labelled(figure, "steep")
@@ -571,9 +687,13 @@ def test_what_is_not_to_be_read_is_said() -> None:
     coarse = slipsweep.sweep(5.0, 0.3, [1.0, 3.0, 4.0, 9.0], [1.0, 2.0, 4.0])
     text = caption(coarse.slipsweep.chart("contours"))
     assert "Coarse grid: values grow more than tenfold from cell to cell" in text
-    assert "of the sliding cells slide continuously with estimated friction: not for design." in text
+    assert (
+        "of the sliding cells slide continuously with estimated friction: not for design." in text
+    )
     angles = slipsweep.sweep(5.0, phi=[20.0, 24.0], amplitude=[2.0, 4.0, 6.0], frequency=[1.0, 2.0])
-    slices = Result(angles, "angles").select(["permanent_displacement"], {"amplitude": slice(None)}, {"phi": 22.0})
+    slices = Result(angles, "angles").select(
+        ["permanent_displacement"], {"amplitude": slice(None)}, {"phi": 22.0}
+    )
     own = slipsweep.sweep(5.0, phi=22.0, amplitude=[2.0, 4.0, 6.0], frequency=1.0)
     np.testing.assert_array_equal(slices.permanent_displacement, own.permanent_displacement)
 
@@ -583,12 +703,17 @@ def test_little_to_draw(grid: xr.Dataset) -> None:
     small = slipsweep.sweep([0.0, 5.0, 30.0], [0.3, 0.5], [1.0, 2.0, 4.0, 7.0], [1.0, 2.0, 4.0])
     for fill in (0.0, np.nan):
         data = small.assign(permanent_displacement=small.permanent_displacement * 0 + fill)
-        result, options = Result(data, "small"), Options()
-        figures, left_out = kinds.draw_all(result, kinds.fitting(result, options), options, strict=False)
+        result = Result(data, "small")
+        options = Options()
+        figures, left_out = kinds.draw_all(
+            result, kinds.fitting(result, options), options, strict=False
+        )
         assert set(left_out) == {"families", "dimensionless"}
         assert "No contours: no values" in caption(figures["contours"])
     single = small.permanent_displacement.where(small.amplitude == 7.0, 0.0)
-    figure = small.assign(permanent_displacement=single).slipsweep.chart("families", at={"theta": 0, "mu_s": 0.5})
+    figure = small.assign(permanent_displacement=single).slipsweep.chart(
+        "families", at={"theta": 0, "mu_s": 0.5}
+    )
     for line in labelled(figure, "f = "):  # a line through one point is none: it has a marker
         assert np.isfinite(line.get_ydata()[np.asarray(line.get_markevery())]).tolist() == [True]
 
@@ -600,21 +725,41 @@ def test_little_to_draw(grid: xr.Dataset) -> None:
 def test_default_set_of_charts(path: Path, here: Path) -> None:
     assert main(["chart", str(path)]) == 0
     drawn = [kind for kind in SWEEP_KINDS if kind != "curve"]
-    assert sorted(one.name for one in here.iterdir()) == sorted(f"grid-{kind}.png" for kind in drawn)
+    assert sorted(one.name for one in here.iterdir()) == sorted(
+        f"grid-{kind}.png" for kind in drawn
+    )
     for one in here.iterdir():
         image = matplotlib.image.imread(one)
         assert image.shape[1] == 1050
         assert image[..., :3].std() > 0.05
     assert main(["chart", str(path)]) == 2  # existing files are overwritten only with --overwrite
     assert main(["chart", str(path), "--kind", "modes", "--overwrite"]) == 0
-    assert main(["chart", str(path), "--at", "theta=6", "--at", "mu_s=0.45", "--at", "frequency=1"]) == 0
+    assert (
+        main(["chart", str(path), "--at", "theta=6", "--at", "mu_s=0.45", "--at", "frequency=1"])
+        == 0
+    )
     assert Path("grid-curve.png").exists()
 
 
 @pytest.mark.usefixtures("without_layout")
 def test_formats(path: Path, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     outputs = [f"-oa.{suffix}" for suffix in ("png", "svg", "pdf")]
-    assert main(["chart", str(path), "--at", "theta=12", "--kind", "contours", "--width", "3.5inch", *outputs]) == 0
+    assert (
+        main(
+            [
+                "chart",
+                str(path),
+                "--at",
+                "theta=12",
+                "--kind",
+                "contours",
+                "--width",
+                "3.5inch",
+                *outputs,
+            ]
+        )
+        == 0
+    )
     assert capsys.readouterr().out.split() == ["a.png", "a.svg", "a.pdf"]
     assert matplotlib.image.imread("a.png").shape[1] == 525
     assert ElementTree.parse("a.svg").getroot().tag == "{http://www.w3.org/2000/svg}svg"
@@ -625,20 +770,28 @@ def test_formats(path: Path, here: Path, capsys: pytest.CaptureFixture[str]) -> 
     ("arguments", "message"),
     [
         ("--at theta=45", "theta = 45: outside the range of the result, 0 to 20 degree"),
-        ("--at theta=steep", 'theta = "steep": must be a number, with a unit that converts to degree'),
+        (
+            "--at theta=steep",
+            'theta = "steep": must be a number, with a unit that converts to degree',
+        ),
         ("--at theta", "--at theta: must be NAME=VALUE"),
         ("--kind contour", 'did you mean "contours"?'),
         ("--kind contours --variable validity", "is a code"),
         ("--kind contours --x theta --y theta", "--y theta: no such axis"),
         ("--kind contours --x theta --at theta=3", "is an axis of this chart"),
-        ("-k modes --at theta=6 --at mu_s=0.3 --at frequency=1", "needs another axis with two values or more"),
+        (
+            "-k modes --at theta=6 --at mu_s=0.3 --at frequency=1",
+            "needs another axis with two values or more",
+        ),
         ("-o a.png", "give one --kind"),
         ("-k contours --levels 1cm", "levels: 0.01: must be two different values or more"),
         ("--kind modes -o a.gif", "must end in one of .png, .svg, .pdf"),
         ("--kind modes --width 9mm", "width = 9mm: must be 50 to 1000 mm"),
     ],
 )
-def test_bad_commands(path: Path, here: Path, capsys: pytest.CaptureFixture[str], arguments: str, message: str) -> None:
+def test_bad_commands(
+    path: Path, here: Path, capsys: pytest.CaptureFixture[str], arguments: str, message: str
+) -> None:
     assert main(["chart", str(path), *arguments.split()]) == 2
     printed = capsys.readouterr()
     assert printed.err.startswith("slipsweep: error: ")
@@ -662,10 +815,19 @@ def test_the_title_page_names_axes_and_flags(path: Path) -> None:
     ("spoil", "message"),
     [
         (lambda data: data.assign_attrs(rise=7.5), "attributes do not say what was solved"),
-        (lambda data: data.attrs.pop("recoupling"), "attribute 'recoupling': missing; it says what was solved"),
-        (lambda data: data.amplitude.attrs.update(units="g"), 'amplitude: units = "g"; must be "m s-2"'),
+        (
+            lambda data: data.attrs.pop("recoupling"),
+            "attribute 'recoupling': missing; it says what was solved",
+        ),
+        (
+            lambda data: data.amplitude.attrs.update(units="g"),
+            'amplitude: units = "g"; must be "m s-2"',
+        ),
         (lambda data: data.isel(theta=slice(0)), "holds no cells"),
-        (lambda data: data.swap_dims(theta="case").isel(amplitude=0, frequency=0), "needs an axis with two values"),
+        (
+            lambda data: data.swap_dims(theta="case").isel(amplitude=0, frequency=0),
+            "needs an axis with two values",
+        ),
     ],
 )
 def test_a_spoilt_result_is_refused_in_one_line(spoil: Any, message: str) -> None:

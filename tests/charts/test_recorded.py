@@ -29,9 +29,14 @@ def suite() -> slipsweep.Suite:
 @pytest.fixture(scope="module")
 def result(suite: slipsweep.Suite) -> xr.Dataset:
     return slipsweep.sweep(
-        [5.0, 20.0], [0.3, 0.4], AMPLITUDES, excitation=suite, polarity="both", model="newmark",
+        [5.0, 20.0],
+        [0.3, 0.4],
+        AMPLITUDES,
+        excitation=suite,
+        polarity="both",
+        model="newmark",
         variables=["permanent_displacement", "validity", "newmark_displacement", "motion_factor"],
-    )  # fmt: skip
+    )
 
 
 def check_regression(figure: Figure, xs: np.ndarray, ys: np.ndarray) -> None:
@@ -41,16 +46,22 @@ def check_regression(figure: Figure, xs: np.ndarray, ys: np.ndarray) -> None:
     slope, intercept = np.polyfit(*logs, 1)
     scatter = np.sqrt(np.sum((logs[1] - intercept - slope * logs[0]) ** 2) / (slid.sum() - 2))
     explained = np.corrcoef(*logs)[0, 1] ** 2
-    assert figure.axes[0].get_title() == f"slope {slope:.2f}, R² = {explained:.2f}, σ = {scatter:.2f}"
+    assert (
+        figure.axes[0].get_title() == f"slope {slope:.2f}, R² = {explained:.2f}, σ = {scatter:.2f}"
+    )
     (line,) = named(figure, "regression")
-    np.testing.assert_allclose(line.get_ydata(), np.exp(intercept) * line.get_xdata() ** slope, rtol=1e-9)
+    np.testing.assert_allclose(
+        line.get_ydata(), np.exp(intercept) * line.get_xdata() ** slope, rtol=1e-9
+    )
 
 
 def bars_of(figure: Figure) -> tuple[np.ndarray, np.ndarray]:
     """Heights and edges of a histogram, each bar with a line around it."""
     (bars,) = figure.axes[0].containers
     edges = [patch.get_x() for patch in bars] + [bars[-1].get_x() + bars[-1].get_width()]
-    assert all(patch.get_linewidth() > 0 and patch.get_edgecolor()[:3] == (0, 0, 0) for patch in bars)
+    assert all(
+        patch.get_linewidth() > 0 and patch.get_edgecolor()[:3] == (0, 0, 0) for patch in bars
+    )
     return np.array([patch.get_height() for patch in bars]), np.array(edges)
 
 
@@ -104,20 +115,31 @@ def test_motions_without_a_value_are_counted_by_reason(suite: slipsweep.Suite) -
 
 
 @pytest.mark.parametrize("measure", list(INTENSITY_MEASURES))
-def test_intensity_is_that_of_the_motion_as_it_shakes_the_block(suite: slipsweep.Suite, measure: str) -> None:
+def test_intensity_is_that_of_the_motion_as_it_shakes_the_block(
+    suite: slipsweep.Suite, measure: str
+) -> None:
     """Against the measures of a record that is scaled and stretched before they are taken."""
-    stretched = 1.0 if measure == "mean_period" else 1.25  # it is of frequencies that time does not change
-    result = slipsweep.sweep(5.0, 0.3, 2.5, excitation=suite, time_scale=stretched)  # one does not slide
+    stretched = (
+        1.0 if measure == "mean_period" else 1.25
+    )  # it is of frequencies that time does not change
+    result = slipsweep.sweep(
+        5.0, 0.3, 2.5, excitation=suite, time_scale=stretched
+    )  # one does not slide
     figure = result.slipsweep.chart("intensity", x=measure)
     pairs = zip(suite.components, result.motion_factor.values, strict=True)
-    shaken = [slipsweep.Record(one.times * stretched, one.acceleration * factor) for one, factor in pairs]
-    expected = np.array([intensity_measures(one.times, one.acceleration)[measure] for one in shaken])
+    shaken = [
+        slipsweep.Record(one.times * stretched, one.acceleration * factor) for one, factor in pairs
+    ]
+    expected = np.array(
+        [intensity_measures(one.times, one.acceleration)[measure] for one in shaken]
+    )
     values = result.permanent_displacement.values * 1000.0
     if measure == "pga":  # all are scaled to it
         assert figure.axes[0].get_title() == "no regression: one value for all motions"
     else:
         check_regression(figure, expected, values)
-    (points,), (below,) = named(figure, "a motion"), named(figure, "below")
+    (points,) = named(figure, "a motion")
+    (below,) = named(figure, "below")
     shown = values >= figure.axes[0].get_ylim()[0]
     assert shown.sum() > 3
     np.testing.assert_allclose(points.get_xdata(), expected[shown], rtol=1e-9)
@@ -134,7 +156,9 @@ def test_histogram_counts_every_motion_that_slides(result: xr.Dataset) -> None:
     counts, edges = bars_of(figure)
     np.testing.assert_array_equal(counts, np.histogram(values[values > 0], edges)[0])
     assert counts.sum() == values.size - zeros
-    for amplitude in AMPLITUDES[2:]:  # the largest lies in the last bar, however its logarithm is rounded
+    for amplitude in AMPLITUDES[
+        2:
+    ]:  # the largest lies in the last bar, however its logarithm is rounded
         for mu_s in (0.3, 0.4):
             at = {"theta": 5.0, "mu_s": mu_s, "amplitude": amplitude}
             shown, _ = bars_of(result.slipsweep.chart("histogram", at=at))
@@ -169,21 +193,37 @@ def test_fragility_is_the_share_of_motions_that_exceed(result: xr.Dataset) -> No
 
 def test_some_motions_of_a_suite(result: xr.Dataset, suite: slipsweep.Suite) -> None:
     chosen = suite.labels[:2]
-    figure = result.slipsweep.chart("motions", at={"motion": chosen, "polarity": -1, "theta": 5, "mu_s": 0.3})
+    figure = result.slipsweep.chart(
+        "motions", at={"motion": chosen, "polarity": -1, "theta": 5, "mu_s": 0.3}
+    )
     assert len(named(figure, "motion")) == 2
     (median,) = named(figure, "median")
     values = result.permanent_displacement.sel(motion=list(chosen), polarity=-1, theta=5, mu_s=0.3)
-    assert median.get_ydata()[-1] == pytest.approx(1000.0 * values.isel(amplitude=-1).median().item(), rel=1e-12)
+    assert median.get_ydata()[-1] == pytest.approx(
+        1000.0 * values.isel(amplitude=-1).median().item(), rel=1e-12
+    )
 
 
 def test_what_is_refused_of_recorded_motions(result: xr.Dataset) -> None:
     for arguments, message in (
-        (("contours",), "--kind contours: is a sweep under a suite of motions: must be one of motions, fragility"),
-        (("motions", {"at": {"mu_s": 0.35}}), "its neighbours are 0.3 and 0.4 .nothing is computed again"),
-        (("motions", {"at": {"motion": "none"}}), "motion = none: must be a number or one of rock-far_H1"),
+        (
+            ("contours",),
+            "--kind contours: is a sweep under a suite of motions: must be one of motions, fragility",
+        ),
+        (
+            ("motions", {"at": {"mu_s": 0.35}}),
+            "its neighbours are 0.3 and 0.4 .nothing is computed again",
+        ),
+        (
+            ("motions", {"at": {"motion": "none"}}),
+            "motion = none: must be a number or one of rock-far_H1",
+        ),
         (("motions", {"y": "mu_s"}), "--y mu_s: not with a chart over one axis, --x; use --panels"),
         (("intensity", {"x": "mu_s"}), "--x mu_s: no intensity measure; known here: pga, pgv"),
-        (("motions", {"panels": ["mu_s"], "ax": Figure().subplots()}), "ax: is one panel, and this chart has 2"),
+        (
+            ("motions", {"panels": ["mu_s"], "ax": Figure().subplots()}),
+            "ax: is one panel, and this chart has 2",
+        ),
     ):
         kind, options = (*arguments, {})[:2]
         with pytest.raises(InputError, match=message):
@@ -192,16 +232,26 @@ def test_what_is_refused_of_recorded_motions(result: xr.Dataset) -> None:
 
 def test_a_single_record() -> None:
     record = slipsweep.read_record(SWEEPS / "data" / "synthetic.csv")
-    result = slipsweep.sweep(5.0, [0.3, 0.4], excitation=record, scale=[1.0, 1.5, 2.0], polarity="both")
+    result = slipsweep.sweep(
+        5.0, [0.3, 0.4], excitation=record, scale=[1.0, 1.5, 2.0], polarity="both"
+    )
     figure = result.slipsweep.chart(show_cautions=True)
     for line, mu_s in zip(labelled(figure, "μs"), result.mu_s, strict=True):
-        expected = result.permanent_displacement.sel(mu_s=mu_s, polarity=1) * 1000.0  # the record as it is
-        np.testing.assert_allclose(line.get_ydata()[expected > 0], expected[expected > 0], rtol=1e-12)
+        expected = (
+            result.permanent_displacement.sel(mu_s=mu_s, polarity=1) * 1000.0
+        )  # the record as it is
+        np.testing.assert_allclose(
+            line.get_ydata()[expected > 0], expected[expected > 0], rtol=1e-12
+        )
     # marked as unsound: where the displacement falls as the shaking grows
     scales = np.linspace(0.5, 12, 60)
     many = slipsweep.sweep(0.0, 0.3, excitation=record, scale=scales, polarity=-1).squeeze()
-    u, sound = many.permanent_displacement.values, ~slipsweep.flags(many).not_recoupled.values
-    marked = [line.get_xdata()[np.isfinite(line.get_ydata())] for line in named(many.slipsweep.chart(), "unsound")]
+    u = many.permanent_displacement.values
+    sound = ~slipsweep.flags(many).not_recoupled.values
+    marked = [
+        line.get_xdata()[np.isfinite(line.get_ydata())]
+        for line in named(many.slipsweep.chart(), "unsound")
+    ]
     np.testing.assert_array_equal(
         np.isin(scales[1:], np.concatenate(marked)), (u[1:] < u[:-1]) & (u[1:] > 0) & sound[1:]
     )
@@ -215,9 +265,18 @@ def test_newmarks_block_is_solved_under_the_record_in_the_file(tmp_path: Path) -
     at = {"theta": 0, "mu_s": 0.3, "polarity": -1}
     record = slipsweep.read_record(SWEEPS / "data" / "synthetic.csv", units="g", baseline="linear")
     with slipsweep.open_result(tmp_path / "r.nc") as data:
-        expected = 1000 * slipsweep.sweep(
-            0, 0.3, excitation=record, scale=data.scale.values, time_scale=2.0, polarity=-1, model="newmark"
-        ).permanent_displacement  # fmt: skip
+        expected = (
+            1000
+            * slipsweep.sweep(
+                0,
+                0.3,
+                excitation=record,
+                scale=data.scale.values,
+                time_scale=2.0,
+                polarity=-1,
+                model="newmark",
+            ).permanent_displacement
+        )
         (line,) = named(data.slipsweep.chart(at=at), "newmark")
         np.testing.assert_allclose(line.get_ydata(), expected.where(expected > 0), rtol=1e-12)
         without = data.drop_vars(["record_time", "record_acceleration"]).slipsweep.chart(at=at)
@@ -230,7 +289,9 @@ def test_newmarks_block_is_solved_under_the_record_in_the_file(tmp_path: Path) -
 
 def test_limits_of_a_suite(suite: slipsweep.Suite) -> None:
     """Some motions do not reach the displacement: their limits are above all others."""
-    limits = slipsweep.limit_amplitude(0.05, 5.0, [0.3, 0.4], excitation=suite, maximum_amplitude=7.2, model="newmark")
+    limits = slipsweep.limit_amplitude(
+        0.05, 5.0, [0.3, 0.4], excitation=suite, maximum_amplitude=7.2, model="newmark"
+    )
     missing = limits.limit_amplitude.isnull().sum("motion").values
     assert 0 < missing[-1] < 4
     figure = limits.slipsweep.chart()
@@ -254,7 +315,9 @@ def test_every_half_wave_of_a_history_has_its_mode() -> None:
     modes = history.half_wave_mode.values
     assert np.count_nonzero(modes == 1) == history.stick_slip_pulses
     assert np.count_nonzero(modes == 2) == history.continuous_pulses
-    assert min(history.stick_slip_pulses, history.continuous_pulses, np.count_nonzero(modes == 0)) > 0
+    assert (
+        min(history.stick_slip_pulses, history.continuous_pulses, np.count_nonzero(modes == 0)) > 0
+    )
     figure = history.slipsweep.chart("history")
     for name, mode in (("stuck", 0), ("stick_slip", 1), ("continuous", 2)):
         (boxes,) = named(figure, name)
@@ -263,7 +326,9 @@ def test_every_half_wave_of_a_history_has_its_mode() -> None:
         np.testing.assert_allclose(spans[:, 1], history.half_wave_end[modes == mode], rtol=1e-12)
 
 
-def test_the_command_line_draws_what_the_accessor_draws(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command_line_draws_what_the_accessor_draws(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Of a history: by `simulate`, of its file by `chart`, and of its dataset."""
     monkeypatch.chdir(tmp_path)
     given = ["--theta", "5", "--mu-s", "0.38", "--amplitude", "3.55", "--frequency", "1.8"]
@@ -283,22 +348,32 @@ def test_annual_rates(result: xr.Dataset) -> None:
     rates = slipsweep.displacement_hazard(result.sel(theta=5.0), curve, [0.001, 0.01, 0.1])
     axes = Figure().subplots()
     assert rates.slipsweep.chart(ax=axes) is axes
-    figure = slipsweep.displacement_hazard(result.sel(mu_s=0.3), curve, [0.001, 0.01, 0.1]).slipsweep.chart()
+    figure = slipsweep.displacement_hazard(
+        result.sel(mu_s=0.3), curve, [0.001, 0.01, 0.1]
+    ).slipsweep.chart()
     assert legend(figure) == ["θ = 5°", "θ = 20°"]
     short = slipsweep.HazardCurve(np.array([0.5, 4.0]), np.array([1e-2, 8e-3]))
-    figure = slipsweep.displacement_hazard(result.sel(theta=5.0), short, [0.001, 0.01]).slipsweep.chart()
+    figure = slipsweep.displacement_hazard(
+        result.sel(theta=5.0), short, [0.001, 0.01]
+    ).slipsweep.chart()
     assert "above the end of the hazard curve, where" in caption(figure)
     figure.draw_without_rendering()
-    assert not any("times" in text.get_text() for text in figure.axes[0].get_xticklabels(which="both"))
+    assert not any(
+        "times" in text.get_text() for text in figure.axes[0].get_xticklabels(which="both")
+    )
     marks = [line for line in axes.lines if line.get_marker() not in ("", "None", None)]
     for line, mu_s in zip(marks, rates.mu_s, strict=True):
         expected = rates.annual_rate.sel(mu_s=mu_s).values
-        np.testing.assert_allclose(line.get_ydata()[expected > 0], expected[expected > 0], rtol=1e-12)
+        np.testing.assert_allclose(
+            line.get_ydata()[expected > 0], expected[expected > 0], rtol=1e-12
+        )
 
 
 def test_a_chart_in_axes_of_another_figure() -> None:
     """Map and curves of a sweep, side by side, each with its legend and caption."""
-    sweep = slipsweep.sweep([2.0, 5.0], 0.4, np.linspace(2, 8, 9), [1.0, 2.0, 4.0], excitation=slipsweep.Sine(cycles=3))
+    sweep = slipsweep.sweep(
+        [2.0, 5.0], 0.4, np.linspace(2, 8, 9), [1.0, 2.0, 4.0], excitation=slipsweep.Sine(cycles=3)
+    )
     figure = Figure(figsize=(12, 5), layout="constrained")
     left, right = figure.subplots(1, 2)
     assert sweep.slipsweep.chart("contours", ax=left, at={"theta": 5}) is left
@@ -323,26 +398,42 @@ def test_statistics_are_drawn_as_they_are() -> None:
         "amplitude": {"kind": "factor", "distribution": "lognorm", "s": 0.3},
     }
     found = slipsweep.sample(
-        5, amplitude=[4.0, 5.0, 6.0], frequency=[1.0, 2.0], uncertain=uncertain, samples=256, sensitivity=True
+        5,
+        amplitude=[4.0, 5.0, 6.0],
+        frequency=[1.0, 2.0],
+        uncertain=uncertain,
+        samples=256,
+        sensitivity=True,
     )
     at = found.sel(frequency=2.0)
     figure = found.slipsweep.chart("fragility", at={"frequency": "2000mHz"})
     for line, threshold in zip(figure.axes[0].lines, found.threshold, strict=True):
-        np.testing.assert_array_equal(line.get_ydata(), at.exceedance_probability.sel(threshold=threshold))
+        np.testing.assert_array_equal(
+            line.get_ydata(), at.exceedance_probability.sel(threshold=threshold)
+        )
     assert figure.axes[0].get_ylim()[0] < 0.0 < 1.0 < figure.axes[0].get_ylim()[1]
     assert "uncertain: μs ~ lognorm(s=0.1, scale=0.4), A × lognorm(s=0.3)" in caption(figure)
     bands = found.slipsweep.chart("quantiles", at={"frequency": 2})
     (median,) = labelled(bands, "median")
     assert legend(bands) == ["5 to 95 %", "median"]
-    np.testing.assert_allclose(median.get_ydata(), at.displacement_quantile.sel(quantile=0.5) * 1000.0)
-    lines = {line.get_label(): line for line in found.slipsweep.chart("sensitivity", at={"frequency": 2}).axes[0].lines}
+    np.testing.assert_allclose(
+        median.get_ydata(), at.displacement_quantile.sel(quantile=0.5) * 1000.0
+    )
+    lines = {
+        line.get_label(): line
+        for line in found.slipsweep.chart("sensitivity", at={"frequency": 2}).axes[0].lines
+    }
     for symbol, name in (("A", "amplitude"), ("μs", "mu_s")):
         np.testing.assert_array_equal(lines[symbol].get_ydata(), at.total_index.sel(input=name))
     bars = found.slipsweep.chart("sensitivity", at={"frequency": 2, "amplitude": 6.0}).axes[0]
     order = [text.get_text() for text in bars.get_yticklabels()]
     totals = [patch.get_width() for patch in bars.patches][: len(order)]
     names = {"A": "amplitude", "μs": "mu_s"}
-    np.testing.assert_allclose(totals, [at.total_index.sel(amplitude=6.0, input=names[one]).item() for one in order])
+    np.testing.assert_allclose(
+        totals, [at.total_index.sel(amplitude=6.0, input=names[one]).item() for one in order]
+    )
     assert totals == sorted(totals)
     found.valueless_share[0] = 0.25
-    assert "up to 25.0% of the samples" in caption(found.slipsweep.chart("quantiles", at={"frequency": 2}))
+    assert "up to 25.0% of the samples" in caption(
+        found.slipsweep.chart("quantiles", at={"frequency": 2})
+    )

@@ -43,7 +43,10 @@ def test_friction_takes_offsets_off_by_the_rest(capsys: pytest.CaptureFixture[st
 
 def test_calibrate_writes_what_it_finds(capsys: pytest.CaptureFixture[str]) -> None:
     outputs = ("calibration.nc", "calibration.svg", "model.toml")
-    assert cli.main(["calibrate", TEST, *BLOCK, *(word for name in outputs for word in ("-o", name))]) == 0
+    assert (
+        cli.main(["calibrate", TEST, *BLOCK, *(word for name in outputs for word in ("-o", name))])
+        == 0
+    )
     printed = capsys.readouterr().out
     assert "[uncertainty.decay_rate]" in printed
     with xr.open_dataset("calibration.nc") as found:
@@ -60,10 +63,17 @@ def test_calibrate_writes_what_it_finds(capsys: pytest.CaptureFixture[str]) -> N
 def test_constant_friction_is_the_first_line(capsys: pytest.CaptureFixture[str]) -> None:
     names = {"time": "time (s)", "ground_acceleration": "table acceleration (m/s2)"}
     names |= {"block_acceleration": "block acceleration (m/s2)"}
-    coulomb(0.25).to_dataframe().reset_index()[list(names)].rename(columns=names).to_csv("coulomb.csv", index=False)
-    for command in (("friction", "coulomb.csv"), ("calibrate", "coulomb.csv", "--no-cycles", "-o", "model.toml")):
+    coulomb(0.25).to_dataframe().reset_index()[list(names)].rename(columns=names).to_csv(
+        "coulomb.csv", index=False
+    )
+    for command in (
+        ("friction", "coulomb.csv"),
+        ("calibrate", "coulomb.csv", "--no-cycles", "-o", "model.toml"),
+    ):
         assert cli.main([*command, "--theta", "6", "--mu-s", "0.38"]) == 0
-        assert capsys.readouterr().out.startswith("This is a block of constant friction: by statics 0.25")
+        assert capsys.readouterr().out.startswith(
+            "This is a block of constant friction: by statics 0.25"
+        )
     assert 'friction = "newmark"' in Path("model.toml").read_text()
 
 
@@ -80,14 +90,22 @@ def test_several_tests(capsys: pytest.CaptureFixture[str]) -> None:
     ("arguments", "message"),
     [
         (("friction", TEST, *BLOCK, "--rest", "1", "x"), "Invalid value for '--rest'"),
-        (("friction", TEST, *BLOCK, "-o", "friction.toml"), "friction.toml: the name must end in one of .nc"),
-        (("calibrate", TEST, *BLOCK, "--drift", "table"), "drift = 'table': must be 'all', or of the channels"),
+        (
+            ("friction", TEST, *BLOCK, "-o", "friction.toml"),
+            "friction.toml: the name must end in one of .nc",
+        ),
+        (
+            ("calibrate", TEST, *BLOCK, "--drift", "table"),
+            "drift = 'table': must be 'all', or of the channels",
+        ),
         (("calibrate", TEST, *BLOCK, "--model", "newmark"), "must be 'mendez'"),
         (("calibrate", "none.csv", *BLOCK), "none.csv: cannot be read"),
         (("calibrate", TEST, "--theta", "95", "--mu-s", "0.38"), "theta = 95"),
     ],
 )
-def test_what_cannot_be(arguments: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_cannot_be(
+    arguments: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert cli.main(list(arguments)) == 2
     assert message in capsys.readouterr().err
 

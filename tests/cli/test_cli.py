@@ -26,10 +26,22 @@ amplitude.values = [1, 4]
 frequency.values = [1, 2]
 """
 
-SIMULATE = ("simulate", "--theta", "5", "--mu-s", "0.38", "--amplitude", "3.55", "--frequency", "1.8")
+SIMULATE = (
+    "simulate",
+    "--theta",
+    "5",
+    "--mu-s",
+    "0.38",
+    "--amplitude",
+    "3.55",
+    "--frequency",
+    "1.8",
+)
 
 #: All commands.
-NAMES = sorted(one.callback.__name__ for one in cli.app.registered_commands if one.callback is not None)
+NAMES = sorted(
+    one.callback.__name__ for one in cli.app.registered_commands if one.callback is not None
+)
 
 
 def assert_fails(done: "subprocess.CompletedProcess[str]", status: int, *messages: str) -> None:
@@ -95,7 +107,9 @@ def test_the_name_of_the_output(small: Path) -> None:
 
 
 def test_a_sweep_from_standard_input(tmp_path: Path) -> None:
-    done = subprocess.run([*SLIPSWEEP, "run", "-", "-o", "a.nc"], cwd=tmp_path, input=SMALL, text=True, check=False)
+    done = subprocess.run(
+        [*SLIPSWEEP, "run", "-", "-o", "a.nc"], cwd=tmp_path, input=SMALL, text=True, check=False
+    )
     assert done.returncode == 0
     assert names(tmp_path) == {"a.nc"}
 
@@ -105,22 +119,37 @@ def test_a_sweep_from_standard_input(tmp_path: Path) -> None:
     [
         (("run", "none.toml"), "none.toml: cannot be read: No such file"),
         (("run", "."), "cannot be read: Is a directory"),
-        (("run", "bad.toml"), 'bad.toml: axes.theta.units = "kg": must be a unit that converts to degree'),
+        (
+            ("run", "bad.toml"),
+            'bad.toml: axes.theta.units = "kg": must be a unit that converts to degree',
+        ),
         (("run", "broken.toml"), "broken.toml: not valid TOML: "),
         (("run", "small.toml", "-o", "none/a.nc"), "none/a.nc: the folder none does not exist"),
-        (("run", "small.toml", "-o", "small.pdf"), "small.pdf: the name must end in one of .nc, .zarr"),
-        (("run", "small.toml", "-o", "small.CSV"), "small.CSV: the name must end in one of .nc, .zarr"),
+        (
+            ("run", "small.toml", "-o", "small.pdf"),
+            "small.pdf: the name must end in one of .nc, .zarr",
+        ),
+        (
+            ("run", "small.toml", "-o", "small.CSV"),
+            "small.CSV: the name must end in one of .nc, .zarr",
+        ),
         (("run", "small.toml", "-o", "s3://a/b.nc"), "s3://a/b.nc: the name must end in .zarr"),
         (("run", "named.toml"), "b.pdf: the name must end in one of .nc, .zarr"),
         (("explore", "small.nc", "-o", "a.pdf"), "a.pdf: the name must end in one of .html, .htm"),
         (("info", "none.nc"), "none.nc: no such file"),
         (("info", "small.toml"), "small.toml: not a netCDF file"),
         (("info", "small.toml"), "); of a sweep file slipsweep run makes one"),
-        ((*SIMULATE, "-o", "a.txt"), "a.txt: the name must end in one of .nc, .csv, .png, .svg, .pdf"),
+        (
+            (*SIMULATE, "-o", "a.txt"),
+            "a.txt: the name must end in one of .nc, .csv, .png, .svg, .pdf",
+        ),
         ((*SIMULATE, "-o", "small.csv"), "small.csv: exists already"),
         ((*SIMULATE, "--theta", "95"), "theta"),
         ((*SIMULATE, "--mu-s", "nan"), "mu_s"),
-        ((*SIMULATE, "--ramp-in", "7", "--ramp-out", "8"), "--ramp-in + --ramp-out = 15: must not exceed"),
+        (
+            (*SIMULATE, "--ramp-in", "7", "--ramp-out", "8"),
+            "--ramp-in + --ramp-out = 15: must not exceed",
+        ),
     ],
 )
 def test_bad_input_fails_in_one_line(small: Path, arguments: tuple[str, ...], message: str) -> None:
@@ -138,12 +167,17 @@ def test_bad_input_fails_in_one_line(small: Path, arguments: tuple[str, ...], me
     [
         (("run",), "Missing argument"),
         (("rum",), "No such command 'rum'"),
-        (("run", "a.toml", "--ouput", "a.nc"), "No such option: --ouput (Possible options: --output)"),
+        (
+            ("run", "a.toml", "--ouput", "a.nc"),
+            "No such option: --ouput (Possible options: --output)",
+        ),
         (("run", "a.toml", "--solver", "fast"), "'fast' is not one of"),
         (("simulate", "--mu-s", "rough"), "Invalid value for '--mu-s'"),
     ],
 )
-def test_bad_commands_are_refused_by_typer(tmp_path: Path, arguments: tuple[str, ...], message: str) -> None:
+def test_bad_commands_are_refused_by_typer(
+    tmp_path: Path, arguments: tuple[str, ...], message: str
+) -> None:
     done = command(tmp_path, *arguments)
     assert (done.returncode, done.stdout) == (2, "")
     assert message in " ".join(done.stderr.replace("│", "").split())
@@ -158,7 +192,8 @@ def limited() -> None:
 
 @pytest.mark.skipif(os.name != "posix", reason="limits the size of files the POSIX way")
 @pytest.mark.parametrize(
-    "line", ["run small.toml -o a.nc", "chart small.nc -k contours -o a.pdf", "export small.nc -o a.xlsx"]
+    "line",
+    ["run small.toml -o a.nc", "chart small.nc -k contours -o a.pdf", "export small.nc -o a.xlsx"],
 )
 def test_a_full_disk_leaves_one_line_that_names_the_file(small: Path, line: str) -> None:
     *arguments, name = line.split()
@@ -176,7 +211,12 @@ def test_a_full_disk_leaves_one_line_that_names_the_file(small: Path, line: str)
 def test_output_that_is_lost_is_said(small: Path) -> None:
     with open("/dev/full", "w") as full:
         done = subprocess.run(
-            [*SLIPSWEEP, "run", "small.toml"], cwd=small, stdout=full, stderr=subprocess.PIPE, text=True, check=False
+            [*SLIPSWEEP, "run", "small.toml"],
+            cwd=small,
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
         )
     assert done.returncode == 1
     assert done.stderr == "slipsweep: error: what is printed: No space left on device\n"
@@ -185,7 +225,9 @@ def test_output_that_is_lost_is_said(small: Path) -> None:
 
 def test_settings_of_other_programs_do_no_harm(small: Path) -> None:
     setting = {"MPLBACKEND": "nonsense", "PYTHONIOENCODING": "ascii"}
-    done = slipsweep(small, "limit", "small.toml", "-d", "50mm", "-o", "limit.png", environment=setting)
+    done = slipsweep(
+        small, "limit", "small.toml", "-d", "50mm", "-o", "limit.png", environment=setting
+    )
     assert (done.returncode, done.stderr) == (0, "")
     assert (small / "limit.png").exists()
 
@@ -202,11 +244,18 @@ sys.exit(main(["run", "small.toml"]) or main(["chart", "small.nc", "-k", "contou
 
 
 def test_a_user_without_home_and_account_is_served(small: Path) -> None:
-    environment = {name: value for name, value in os.environ.items() if not name.startswith(("HOME", "XDG"))}
+    environment = {
+        name: value for name, value in os.environ.items() if not name.startswith(("HOME", "XDG"))
+    }
     done = subprocess.run(
-        [sys.executable, "-c", NOBODY], cwd=small, env=environment, capture_output=True, text=True,
-        timeout=300, check=False,
-    )  # fmt: skip
+        [sys.executable, "-c", NOBODY],
+        cwd=small,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
 
@@ -233,7 +282,9 @@ def test_info(small: Path) -> None:
     assert "  theta                   2 values, 0 to 5 degree" in lines
     assert "  permanent_displacement  permanent displacement, downslope, m (float64)" in lines
     assert any(line.startswith("  stuck  ") and line.endswith("%") for line in lines)
-    assert any(line.startswith("history: ") and line.endswith("slipsweep run small.toml") for line in lines)
+    assert any(
+        line.startswith("history: ") and line.endswith("slipsweep run small.toml") for line in lines
+    )
     assert "  mu_s.values = [0.3, 0.5]" in lines
 
 
@@ -255,7 +306,9 @@ def test_simulate_writes_every_kind(tmp_path: Path) -> None:
         column = header.index("relative_displacement (m)")
         assert header[0] == "time (s)"
         np.testing.assert_array_equal([float(row[column]) for row in rows], displacement)
-        assert float(displacement[-1]) == pytest.approx(float(dataset["permanent_displacement"]), rel=1e-9)
+        assert float(displacement[-1]) == pytest.approx(
+            float(dataset["permanent_displacement"]), rel=1e-9
+        )
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
     assert (tmp_path / "a.pdf").read_bytes().startswith(b"%PDF")
     assert "<svg" in (tmp_path / "a.svg").read_text()
@@ -269,8 +322,12 @@ def test_a_report_has_a_title_page_and_a_chart_a_page(small: Path) -> None:
     content = (small / "small.pdf").read_bytes()
     # contours, modes, families, dimensionless, spread, ratio
     assert len(re.findall(rb"/Type /Page\b", content)) == 1 + 6
-    assert_fails(command(small, "report", "small.nc"), 2, "small.pdf: exists already; give --overwrite")
-    assert_fails(command(small, "report", "small.nc", "-o", "a.png"), 2, "a.png: the name must end in .pdf")
+    assert_fails(
+        command(small, "report", "small.nc"), 2, "small.pdf: exists already; give --overwrite"
+    )
+    assert_fails(
+        command(small, "report", "small.nc", "-o", "a.png"), 2, "a.png: the name must end in .pdf"
+    )
     assert (small / "small.pdf").read_bytes() == content
     assert command(small, "report", "small.nc", "--overwrite").returncode == 0
 
@@ -281,18 +338,37 @@ def test_a_report_has_a_title_page_and_a_chart_a_page(small: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "heavy"),
     [
-        (["--help"], {"numpy", "numba", "xarray", "netCDF4", "pint", "matplotlib", "dask", "pandas", "scipy"}),
+        (
+            ["--help"],
+            {
+                "numpy",
+                "numba",
+                "xarray",
+                "netCDF4",
+                "pint",
+                "matplotlib",
+                "dask",
+                "pandas",
+                "scipy",
+            },
+        ),
         (["run", "small.toml"], {"matplotlib"}),
     ],
 )
-def test_what_a_command_does_not_need_is_not_loaded(small: Path, arguments: list[str], heavy: set[str]) -> None:
+def test_what_a_command_does_not_need_is_not_loaded(
+    small: Path, arguments: list[str], heavy: set[str]
+) -> None:
     code = f"import sys; from slipsweep.cli import main; main({arguments}); print(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], cwd=small, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=small, capture_output=True, text=True, check=True
+    )
     assert not heavy & {name.partition(".")[0] for name in done.stdout.splitlines()[-1].split()}
 
 
 @pytest.mark.parametrize("name", ["", *NAMES])
-def test_help_names_its_examples_and_their_options(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+def test_help_names_its_examples_and_their_options(
+    monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
     monkeypatch.setenv("COLUMNS", "150")
     ended = run_command(*([name] if name else []), "--help")
     assert ended.status == 0
@@ -310,7 +386,9 @@ def test_a_terminal_sees_progress(small: Path) -> None:
     reader, writer = pty.openpty()
     seen = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "100", "PYTHONUTF8": "1"}
     read = b""
-    with subprocess.Popen([*SLIPSWEEP, "run", "small.toml"], cwd=small, env=seen, stdout=writer, stderr=writer):
+    with subprocess.Popen(
+        [*SLIPSWEEP, "run", "small.toml"], cwd=small, env=seen, stdout=writer, stderr=writer
+    ):
         os.close(writer)
         with contextlib.suppress(OSError):  # how Linux says that the other end is closed
             while part := os.read(reader, 10_000):

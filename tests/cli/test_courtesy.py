@@ -22,7 +22,11 @@ def told(*arguments: object, status: int = 0) -> str:
     ("typed", "same", "echo"),
     [
         (("--amplitude", "0.5g"), ("--amplitude", "4.905"), "amplitude 4.905 m/s2 (0.5 g)"),
-        (("--amplitude", "0.5g", "--g", "9.8"), ("--amplitude", "4.9", "--g", "9.8"), "amplitude 4.9 m/s2 (0.5 g)"),
+        (
+            ("--amplitude", "0.5g", "--g", "9.8"),
+            ("--amplitude", "4.9", "--g", "9.8"),
+            "amplitude 4.9 m/s2 (0.5 g)",
+        ),
         (
             ("--amplitude", "4", "--theta", "300 arcmin", "--frequency", "120 rpm"),
             ("--amplitude", "4"),
@@ -33,10 +37,16 @@ def told(*arguments: object, status: int = 0) -> str:
             ("--amplitude", "4", "--yield-acceleration", "0.981"),
             "yield acceleration 0.981 m/s2 (0.1 g)",
         ),
-        (("--displacement-amplitude", "30mm"), ("--displacement-amplitude", "0.03"), "displacement amplitude 0.03 m"),
+        (
+            ("--displacement-amplitude", "30mm"),
+            ("--displacement-amplitude", "0.03"),
+            "displacement amplitude 0.03 m",
+        ),
     ],
 )
-def test_simulate_takes_units_and_says_what_it_took(typed: tuple[str, ...], same: tuple[str, ...], echo: str) -> None:
+def test_simulate_takes_units_and_says_what_it_took(
+    typed: tuple[str, ...], same: tuple[str, ...], echo: str
+) -> None:
     first, other = (told(*BLOCK, *given) for given in (typed, same))
     assert first == other
     assert "taken as                theta 5 degree, " in first
@@ -47,7 +57,10 @@ def test_simulate_takes_units_and_says_what_it_took(typed: tuple[str, ...], same
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (("--amplitude", "high"), '--amplitude = "high": must be a number, with a unit that converts to m s-2'),
+        (
+            ("--amplitude", "high"),
+            '--amplitude = "high": must be a number, with a unit that converts to m s-2',
+        ),
         (
             ("--amplitude", "4", "--theta", "5%"),
             '--theta = "5%": must be a number, with a unit that converts to degree',
@@ -62,12 +75,17 @@ def test_a_unit_that_does_not_fit_is_refused(given: tuple[str, ...], message: st
 @pytest.mark.parametrize(
     ("given", "flag"),
     [
-        (("--amplitude", "4", "--yield-acceleration", "-0.1g"), "statically_unstable: yield acceleration <= 0"),
+        (
+            ("--amplitude", "4", "--yield-acceleration", "-0.1g"),
+            "statically_unstable: yield acceleration <= 0",
+        ),
         (("--amplitude", "12g"), "uplift: A tan(theta) >= g"),
         (("--amplitude", "2.9", "--rise", "literal"), "kd_not_positive: literal rise: Kd <= 0"),
     ],
 )
-def test_simulate_without_a_value_says_why_and_fails(tmp_path: Path, given: tuple[str, ...], flag: str) -> None:
+def test_simulate_without_a_value_says_why_and_fails(
+    tmp_path: Path, given: tuple[str, ...], flag: str
+) -> None:
     message = told(*BLOCK, *given, "-o", tmp_path / "a.csv", status=1)
     assert f"the model gives no value: {flag}" in message
     assert message.count("\n") == 1
@@ -78,7 +96,9 @@ def test_reasons_and_remedies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     """An angle taken for a coefficient, values that a record lacks, an axis that is not there, and unsound places."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a.toml").write_text(SWEEP.replace("0.4", "22"))
-    assert "no cell has a value: 1 - tan(theta) (mu_s - tan(theta)) <= 0" in (out := told("run", "a.toml"))
+    assert "no cell has a value: 1 - tan(theta) (mu_s - tan(theta)) <= 0" in (
+        out := told("run", "a.toml")
+    )
     assert "did you mean phi = 22?" in out
     (tmp_path / "a.csv").write_text("0,1\n1,-999\n2,0\n")
     message = told("simulate", "--record", "a.csv", "--units", "m/s2", *BLOCK[1:5], status=2)
@@ -86,7 +106,9 @@ def test_reasons_and_remedies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     (tmp_path / "c.toml").write_text(SWEEP.replace("[4]", "[0.1]").replace("[5]", "[0, 5]"))
     smallest = 9.81 * math.tan(math.atan(0.4) - math.radians(5))
     assert f"smallest yield acceleration {smallest:.6g} m/s2" in told("run", "c.toml")
-    axes = SWEEP.replace("mu_s", "phi").replace("0.4", "20, 22").replace("[4]", "[2, 4, 6, 8, 10, 12]")
+    axes = (
+        SWEEP.replace("mu_s", "phi").replace("0.4", "20, 22").replace("[4]", "[2, 4, 6, 8, 10, 12]")
+    )
     (tmp_path / "b.toml").write_text(axes)
     assert "unsound: the displacement falls with A in " in told("run", "b.toml")
     told("chart", "b.nc", "-k", "curve", "--at", "mu_s=0.404", "-o", "a.png")
@@ -98,9 +120,14 @@ def test_hazard_of_samples_has_rows_for_each_frequency(tmp_path: Path) -> None:
     (tmp_path / "curve.csv").write_text("PGA (g),annual rate\n0.1,0.01\n1,0.0001\n")
     uncertain = '[uncertainty]\nsamples = 8\nthresholds = ["1cm"]\n'
     uncertain += '[uncertainty.mu_s]\ndistribution = "lognorm"\ns = 0.1\nscale = 0.4\n'
-    axes = SWEEP.replace("mu_s.values = [0.4]\n", "").replace("[4]", "[2, 5, 8]").replace("[2]", "[1, 2]")
+    axes = (
+        SWEEP.replace("mu_s.values = [0.4]\n", "")
+        .replace("[4]", "[2, 5, 8]")
+        .replace("[2]", "[1, 2]")
+    )
     (tmp_path / "a.toml").write_text(axes + uncertain)
-    result, figure = tmp_path / "a.nc", tmp_path / "rates.png"
+    result = tmp_path / "a.nc"
+    figure = tmp_path / "rates.png"
     told("run", tmp_path / "a.toml", "-o", result)
     out = told("hazard", result, "--curve", tmp_path / "curve.csv", "-d", "1cm", "-o", figure)
     assert figure.exists()

@@ -21,8 +21,14 @@ BLOCK: dict[str, Any] = {"theta": 5.0, "mu_s": 0.4, "amplitude": 4.0, "frequency
     [
         ({}, "Üy by Coulomb, λ by Eq. 6, Δμ by Eqs. 10–11: estimated"),
         ({"yield_acceleration": [0.5, 1.0]}, "Üy given; λ by Eq. 6, Δμ by Eqs. 10–11: estimated"),
-        ({"minimum_friction": 0.1}, "Üy by Coulomb, λ by Eq. 6 (μmin given), Δμ by Eqs. 10–11: estimated"),
-        ({"decay_rate": 2.7, "minimum_friction": 0.1}, "λ given; Üy by Coulomb, Δμ by Eqs. 10–11: estimated"),
+        (
+            {"minimum_friction": 0.1},
+            "Üy by Coulomb, λ by Eq. 6 (μmin given), Δμ by Eqs. 10–11: estimated",
+        ),
+        (
+            {"decay_rate": 2.7, "minimum_friction": 0.1},
+            "λ given; Üy by Coulomb, Δμ by Eqs. 10–11: estimated",
+        ),
         ({"yield_acceleration": 0.59, "decay_rate": 2.7, "delta_mu": 0.09}, "Üy, λ, Δμ given"),
         ({"model": "newmark"}, "Üy by Coulomb: estimated"),
         ({"model": "newmark", "yield_acceleration": 0.59, "decay_rate": 2.7}, "Üy given"),
@@ -46,8 +52,16 @@ def test_every_result_says_what_is_estimated(given: dict[str, Any], words: str) 
     [
         ((), {"mu_s": "absolute"}, "Üy by Coulomb, λ by Eq. 6, Δμ by Eqs. 10–11: estimated"),
         ((), {"decay_rate": "absolute"}, "λ drawn; Üy by Coulomb, Δμ by Eqs. 10–11: estimated"),
-        ((), {"decay_rate": "factor"}, "Üy by Coulomb, λ by Eq. 6 (drawn about it), Δμ by Eqs. 10–11: estimated"),
-        (("decay_rate",), {"decay_rate": "factor"}, "λ drawn; Üy by Coulomb, Δμ by Eqs. 10–11: estimated"),
+        (
+            (),
+            {"decay_rate": "factor"},
+            "Üy by Coulomb, λ by Eq. 6 (drawn about it), Δμ by Eqs. 10–11: estimated",
+        ),
+        (
+            ("decay_rate",),
+            {"decay_rate": "factor"},
+            "λ drawn; Üy by Coulomb, Δμ by Eqs. 10–11: estimated",
+        ),
         (
             ("yield_acceleration", "minimum_friction"),
             {"decay_rate": "factor", "delta_mu": "absolute"},
@@ -55,10 +69,13 @@ def test_every_result_says_what_is_estimated(given: dict[str, Any], words: str) 
         ),
     ],
 )
-def test_what_is_drawn_is_told_apart(given: tuple[str, ...], drawn: dict[str, str], words: str) -> None:
+def test_what_is_drawn_is_told_apart(
+    given: tuple[str, ...], drawn: dict[str, str], words: str
+) -> None:
     assert friction_inputs("mendez", given, drawn) == words
     uncertain = {
-        name: {"distribution": "uniform", "loc": 0.9, "scale": 0.2, "kind": kind} for name, kind in drawn.items()
+        name: {"distribution": "uniform", "loc": 0.9, "scale": 0.2, "kind": kind}
+        for name, kind in drawn.items()
     }
     block = {name: value for name, value in BLOCK.items() if drawn.get(name) != "absolute"}
     about: dict[str, Any] = dict.fromkeys(given, 0.5)
@@ -69,11 +86,19 @@ def test_what_is_drawn_is_told_apart(given: tuple[str, ...], drawn: dict[str, st
 def test_summaries_files_and_info_say_it(tmp_path: Path) -> None:
     words = "Üy by Coulomb, λ by Eq. 6, Δμ by Eqs. 10–11: estimated"
     sweep = tmp_path / "a.toml"
-    sweep.write_text("".join(f"[axes.{name}]\nvalues = [{value}]\n" for name, value in BLOCK.items()))
+    sweep.write_text(
+        "".join(f"[axes.{name}]\nvalues = [{value}]\n" for name, value in BLOCK.items())
+    )
     path = tmp_path / "a.nc"
     assert f"\ninputs: {words}\n" in command(tmp_path, "run", sweep, "-o", path).stdout
     assert read_result(path).attrs["friction_inputs"] == words
     assert f"\nfriction_inputs: {words}\n" in command(tmp_path, "info", path).stdout
-    assert f"\ninputs: {words}\n" in command(tmp_path, "limit", sweep, "--displacement", "10mm").stdout
-    options = [option for name, value in BLOCK.items() for option in (f"--{name.replace('_', '-')}", str(value))]
+    assert (
+        f"\ninputs: {words}\n" in command(tmp_path, "limit", sweep, "--displacement", "10mm").stdout
+    )
+    options = [
+        option
+        for name, value in BLOCK.items()
+        for option in (f"--{name.replace('_', '-')}", str(value))
+    ]
     assert f"\ninputs                  {words}\n" in command(tmp_path, "simulate", *options).stdout

@@ -62,7 +62,8 @@ def bare(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 @pytest.mark.parametrize(
-    ("suffix", "chunk_cells"), [(".csv", 7), (".csv", export.CHUNK_CELLS), (".parquet", 7), (".xlsx", 7)]
+    ("suffix", "chunk_cells"),
+    [(".csv", 7), (".csv", export.CHUNK_CELLS), (".parquet", 7), (".xlsx", 7)],
 )
 def test_a_table_has_every_cell_once(
     folder: Path, tmp_path: Path, suffix: str, chunk_cells: int, monkeypatch: pytest.MonkeyPatch
@@ -86,19 +87,33 @@ def test_a_table_has_every_cell_once(
     table, expected = (frame.sort_values(axes, ignore_index=True) for frame in (table, expected))
     assert {*table.columns} == {*expected.columns}
     if chunk_cells > 7:
-        assert list(bare(read(path))["decay_rate"][:4]) == [1.0, 2.5, 1.0, 2.5]  # the last one runs fastest
+        assert list(bare(read(path))["decay_rate"][:4]) == [
+            1.0,
+            2.5,
+            1.0,
+            2.5,
+        ]  # the last one runs fastest
     for name in table:
         # exact: as many digits as bring the value back
-        read_back = table[name].to_numpy(np.float32 if expected[name].dtype == np.float32 else np.float64)
+        read_back = table[name].to_numpy(
+            np.float32 if expected[name].dtype == np.float32 else np.float64
+        )
         np.testing.assert_array_equal(read_back, expected[name].to_numpy(read_back.dtype))
         if read_back.dtype == np.float32 and suffix != ".parquet":  # and no more
-            assert [f"{one:.9g}" for one in table[name]] == [f"{float(str(one)):.9g}" for one in read_back]
+            assert [f"{one:.9g}" for one in table[name]] == [
+                f"{float(str(one)):.9g}" for one in read_back
+            ]
 
 
 def test_a_dimension_that_no_variable_has_is_left_out(tmp_path: Path) -> None:
-    text = GRID.replace("displacement_amplitude", "amplitude").replace("decay_rate", "structure_frequency")
+    text = GRID.replace("displacement_amplitude", "amplitude").replace(
+        "decay_rate", "structure_frequency"
+    )
     store.run(sweep_job(spec.parse(text, "x")), tmp_path / "a.nc", command="x")
-    assert export.export(tmp_path / "a.nc", tmp_path / "a.csv", variables=["limiting_acceleration"]) == 18
+    assert (
+        export.export(tmp_path / "a.nc", tmp_path / "a.csv", variables=["limiting_acceleration"])
+        == 18
+    )
     table = bare(pd.read_csv(tmp_path / "a.csv"))
     assert list(table) == ["theta", "mu_s", "amplitude", "limiting_acceleration"]
     tangent = np.tan(np.radians(table.theta))
@@ -108,15 +123,22 @@ def test_a_dimension_that_no_variable_has_is_left_out(tmp_path: Path) -> None:
 
 
 def test_words(folder: Path, tmp_path: Path) -> None:
-    codes, words = tmp_path / "codes.csv", tmp_path / "words.csv"
+    codes = tmp_path / "codes.csv"
+    words = tmp_path / "words.csv"
     for path, wanted in ((codes, False), (words, True)):
         export.export(folder / "cases.nc", path, words=wanted)
-    coded, worded = bare(read(codes)), bare(read(words))
+    coded = bare(read(codes))
+    worded = bare(read(words))
     assert list(worded["label"]) == ["mild ± slope, wet", "steep"] * 3
-    modes = [slipsweep.SlidingMode(int(c)).name.lower() if c == c else None for c in coded["sliding_mode"]]
+    modes = [
+        slipsweep.SlidingMode(int(c)).name.lower() if c == c else None
+        for c in coded["sliding_mode"]
+    ]
     assert modes[-1] is None
     assert [None if pd.isna(mode) else mode for mode in worded["sliding_mode"]] == modes
-    flags = [" ".join((flag.name or "").lower() for flag in Validity(code)) for code in coded["validity"]]
+    flags = [
+        " ".join((flag.name or "").lower() for flag in Validity(code)) for code in coded["validity"]
+    ]
     assert "statically_unstable" in flags
     assert ["" if pd.isna(flag) else flag for flag in worded["validity"]] == flags
 
@@ -127,11 +149,17 @@ def test_a_parquet_file_tells_how_it_was_made(folder: Path, tmp_path: Path) -> N
     schema = parquet.read_schema(tmp_path / "t.parquet")
     assert schema.metadata[b"sweep"].decode() == CASES
     assert schema.field("permanent_displacement (m)").metadata[b"units"] == b"m"
-    assert schema.field("validity").metadata[b"flag_meanings"].startswith(b"statically_unstable uplift")
+    assert (
+        schema.field("validity")
+        .metadata[b"flag_meanings"]
+        .startswith(b"statically_unstable uplift")
+    )
 
 
 def test_the_command(folder: Path) -> None:
-    done = command(folder, "export", "cases.nc", "-o", "cases.csv", "--words", "--variable", "sliding_mode")
+    done = command(
+        folder, "export", "cases.nc", "-o", "cases.csv", "--words", "--variable", "sliding_mode"
+    )
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith("cases.csv  6 rows, ")
     text = (folder / "cases.csv").read_text(encoding="utf-8")
@@ -140,14 +168,22 @@ def test_the_command(folder: Path) -> None:
     assert again.returncode == 2
     assert "cases.csv: exists already; give --overwrite" in again.stderr
     assert (folder / "cases.csv").read_text(encoding="utf-8") == text
-    assert command(folder, "export", "cases.nc", "-o", "cases.csv", "--overwrite", "-q").stdout == ""
+    assert (
+        command(folder, "export", "cases.nc", "-o", "cases.csv", "--overwrite", "-q").stdout == ""
+    )
 
 
-def test_what_cannot_be_exported(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_cannot_be_exported(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "other.nc").write_text("nothing")
     for arguments, options, message in (
         (("grid.nc", "t.txt"), {}, "the name must end in one of .csv, .parquet, .xlsx"),
-        (("grid.nc", "t.csv"), {"variables": ["permanent_displacment"]}, 'did you mean "permanent_displacement"'),
+        (
+            ("grid.nc", "t.csv"),
+            {"variables": ["permanent_displacment"]},
+            'did you mean "permanent_displacement"',
+        ),
         (("none.nc", "t.csv"), {}, "none.nc: no such file"),
         ((str(tmp_path / "other.nc"), "t.csv"), {}, "not a netCDF file"),
     ):
@@ -157,7 +193,9 @@ def test_what_cannot_be_exported(folder: Path, tmp_path: Path, monkeypatch: pyte
     monkeypatch.delitem(sys.modules, "pyarrow.parquet", raising=False)
     monkeypatch.setitem(sys.modules, "xlsxwriter", None)
     for ending, needs in (("parquet", "pyarrow"), ("xlsx", "xlsxwriter")):
-        with pytest.raises(InputError, match=rf"\.{ending} needs {needs}: pip install 'slipsweep\[{ending}\]'"):
+        with pytest.raises(
+            InputError, match=rf"\.{ending} needs {needs}: pip install 'slipsweep\[{ending}\]'"
+        ):
             export.export(folder / "grid.nc", tmp_path / f"t.{ending}")
     assert [entry.name for entry in tmp_path.iterdir()] == ["other.nc"]
 
@@ -165,7 +203,9 @@ def test_what_cannot_be_exported(folder: Path, tmp_path: Path, monkeypatch: pyte
 # ------------------------------------------------------------------- slices and pivoted tables
 
 
-def test_a_slice_has_the_values_asked_for(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_slice_has_the_values_asked_for(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """By value, by several in the order given, and with a unit."""
     monkeypatch.setattr(export, "CHUNK_CELLS", 1)
     path = tmp_path / "t.csv"
@@ -178,7 +218,8 @@ def test_a_slice_has_the_values_asked_for(folder: Path, tmp_path: Path, monkeypa
         assert list(table.theta) == [20, 20, 5, 5]
         assert set(table.mu_s) == {0.3}
         np.testing.assert_array_equal(
-            table.permanent_displacement.to_numpy(np.float32), cut.permanent_displacement.values.ravel()
+            table.permanent_displacement.to_numpy(np.float32),
+            cut.permanent_displacement.values.ravel(),
         )
 
 
@@ -208,33 +249,65 @@ def test_a_pivoted_table_has_an_axis_as_columns(
         np.testing.assert_array_equal(table.to_numpy(np.float32), expected)
 
 
-def test_the_rows_of_a_pivoted_table_are_all_other_axes_unless_chosen(folder: Path, tmp_path: Path) -> None:
+def test_the_rows_of_a_pivoted_table_are_all_other_axes_unless_chosen(
+    folder: Path, tmp_path: Path
+) -> None:
     path = tmp_path / "t.csv"
-    command_line = ("export", "grid.nc", "-o", path, "--variable", "limiting_acceleration", "--columns", "mu_s")
+    command_line = (
+        "export",
+        "grid.nc",
+        "-o",
+        path,
+        "--variable",
+        "limiting_acceleration",
+        "--columns",
+        "mu_s",
+    )
     assert command(folder, *command_line).stdout.startswith(f"{path}  36 rows, ")
-    assert [header.partition(" ")[0] for header in read(path)][:3] == ["theta", "displacement_amplitude", "frequency"]
+    assert [header.partition(" ")[0] for header in read(path)][:3] == [
+        "theta",
+        "displacement_amplitude",
+        "frequency",
+    ]
     assert list(read(path).iloc[:2, 3]) == [1.0, 2.5]
-    done = command(folder, "export", "cases.nc", "-o", "p.csv", "--variable", "sliding_mode", "--columns", "case")
+    done = command(
+        folder,
+        "export",
+        "cases.nc",
+        "-o",
+        "p.csv",
+        "--variable",
+        "sliding_mode",
+        "--columns",
+        "case",
+    )
     assert done.returncode == 0, done.stderr
     header = (folder / "p.csv").read_text(encoding="utf-8").splitlines()[0]
     assert header == 'frequency (Hz) \\ case: sliding_mode,"mild ± slope, wet",steep'
 
 
-def test_a_pivoted_table_of_a_result_has_the_axes_of_that_result(folder: Path, tmp_path: Path) -> None:
+def test_a_pivoted_table_of_a_result_has_the_axes_of_that_result(
+    folder: Path, tmp_path: Path
+) -> None:
     text = GRID.replace("displacement_amplitude", "amplitude")
     store.run(sweep_job(spec.parse(text, "x")), tmp_path / "a.nc", command="x")
     assert export.export(tmp_path / "a.nc", tmp_path / "t.xlsx", columns="theta") == 3 * 24 + 12
     sheet = pd.read_excel(tmp_path / "t.xlsx", sheet_name="limiting_acceleration")
     names = [header.partition(" ")[0] for header in map(str, sheet)]
     assert names == ["mu_s", "amplitude", "decay_rate", "0", "5", "20"]
-    with pytest.raises(InputError, match="--columns frequency: not an axis of limiting_acceleration; choose others"):
+    with pytest.raises(
+        InputError, match="--columns frequency: not an axis of limiting_acceleration; choose others"
+    ):
         export.export(tmp_path / "a.nc", tmp_path / "u.xlsx", columns="frequency")
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--at", "theta=6"), "theta = 6: not among the values of the result; its neighbours are 5 and 20 degree"),
+        (
+            ("--at", "theta=6"),
+            "theta = 6: not among the values of the result; its neighbours are 5 and 20 degree",
+        ),
         (("--at", "theta=21"), "theta = 21: outside the range of the result, 0 to 20 degree"),
         (("--at", "thet=5"), 'thet = 5: no such axis; did you mean "theta"?'),
         (("--at", "theta=5mm"), "must be a number, with a unit that converts to degree"),
@@ -242,14 +315,19 @@ def test_a_pivoted_table_of_a_result_has_the_axes_of_that_result(folder: Path, t
         (("--rows", "theta"), "--rows theta: needs --columns"),
         (("--columns", "theta", "--rows", "theta"), "must be different axes"),
         (("--columns", "thet"), 'no such axis here; did you mean "theta"?'),
-        (("--columns", "mu_s"), "a table with --columns has one result; choose it with --variable (permanent_disp"),
+        (
+            ("--columns", "mu_s"),
+            "a table with --columns has one result; choose it with --variable (permanent_disp",
+        ),
         (
             ("--columns", "mu_s", "--rows", "theta", "--at", "frequency=2"),
             "neither in --rows nor in --columns: displacement_amplitude (3 values), decay_rate (2 values)",
         ),
     ],
 )
-def test_what_is_no_slice(folder: Path, tmp_path: Path, options: tuple[str, ...], message: str) -> None:
+def test_what_is_no_slice(
+    folder: Path, tmp_path: Path, options: tuple[str, ...], message: str
+) -> None:
     done = command(folder, "export", "grid.nc", "-o", tmp_path / "t.csv", *options)
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert message in done.stderr
@@ -267,14 +345,21 @@ def test_a_case_is_cut_by_its_label(folder: Path, tmp_path: Path) -> None:
 def test_a_spreadsheet_says_what_it_is_of(folder: Path, tmp_path: Path) -> None:
     """Read by another program: a sheet for each result, and one of inputs, estimates, flags and provenance."""
     path = tmp_path / "t.xlsx"
-    export.export(folder / "cases.nc", path, columns="frequency", at={"case": "steep,1"}, words=True)
+    export.export(
+        folder / "cases.nc", path, columns="frequency", at={"case": "steep,1"}, words=True
+    )
     book = openpyxl.load_workbook(path)
     assert book.sheetnames[-1] == "about"
     assert {"permanent_displacement", "sliding_mode", "validity"} <= {*book.sheetnames}
     rows = [*book["validity"].iter_rows(values_only=True)]
-    assert [type(value) for value in rows[0][-3:]] == [int] * 3  # numbers, that a formula can look up
+    assert [type(value) for value in rows[0][-3:]] == [
+        int
+    ] * 3  # numbers, that a formula can look up
     assert [row[-1] for row in rows[1:]] == ["statically_unstable", "yield_governs"]
-    assert book["permanent_displacement"].cell(2, book["permanent_displacement"].max_column).value is None
+    assert (
+        book["permanent_displacement"].cell(2, book["permanent_displacement"].max_column).value
+        is None
+    )
     about = {str(name): text for name, text in book["about"].iter_rows(values_only=True) if name}
     assert about["base inclination"] == "2 values, 5 to 25 degree"
     assert about["friction_inputs"] == "Üy by Coulomb, λ by Eq. 6, Δμ by Eqs. 10–11: estimated"
@@ -291,7 +376,12 @@ def test_a_label_is_no_formula(tmp_path: Path) -> None:
     store.run(sweep_job(spec.parse(text, "x")), tmp_path / "a.nc", command="x")
     export.export(tmp_path / "a.nc", tmp_path / "t.xlsx")
     table = openpyxl.load_workbook(tmp_path / "t.xlsx").worksheets[0]
-    kinds = {cell.value: cell.data_type for row in table.iter_rows() for cell in row if isinstance(cell.value, str)}
+    kinds = {
+        cell.value: cell.data_type
+        for row in table.iter_rows()
+        for cell in row
+        if isinstance(cell.value, str)
+    }
     assert kinds["=1+1"] == "s"
     export.export(tmp_path / "a.nc", tmp_path / "t.csv", variables=["sliding_mode"])
     assert set(read(tmp_path / "t.csv").label) == {"mild ± slope, wet", "'=1+1"}
@@ -300,7 +390,8 @@ def test_a_label_is_no_formula(tmp_path: Path) -> None:
 def test_accelerations_in_g(folder: Path, tmp_path: Path) -> None:
     export.export(folder / "grid.nc", tmp_path / "t.csv", in_g=True)
     export.export(folder / "grid.nc", tmp_path / "u.csv")
-    found, plain = read(tmp_path / "t.csv"), read(tmp_path / "u.csv")
+    found = read(tmp_path / "t.csv")
+    plain = read(tmp_path / "u.csv")
     np.testing.assert_allclose(
         found["limiting_acceleration (g)"], plain["limiting_acceleration (m s-2)"] / 9.81, rtol=1e-6
     )
@@ -310,12 +401,22 @@ def test_accelerations_in_g(folder: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("num", "options", "message"),
     [
-        (1200, {}, "the table has 1440000 rows (1200 theta x 1200 mu_s) and 3 columns, a sheet of .xlsx 1048576"),
+        (
+            1200,
+            {},
+            "the table has 1440000 rows (1200 theta x 1200 mu_s) and 3 columns, a sheet of .xlsx 1048576",
+        ),
         (524288, {}, "the table has 1048576 rows"),
-        (17000, {"columns": "theta"}, "and 17001 columns, a sheet of .xlsx 1048576 with its header and 16384"),
+        (
+            17000,
+            {"columns": "theta"},
+            "and 17001 columns, a sheet of .xlsx 1048576 with its header and 16384",
+        ),
     ],
-)  # fmt: skip
-def test_what_no_spreadsheet_holds(tmp_path: Path, num: int, options: dict[str, Any], message: str) -> None:
+)
+def test_what_no_spreadsheet_holds(
+    tmp_path: Path, num: int, options: dict[str, Any], message: str
+) -> None:
     shape = (num, 1200 if num == 1200 else 2)
     modes = xr.DataArray(np.zeros(shape, np.int8), dims=("theta", "mu_s"), name="sliding_mode")
     data = modes.assign_coords(theta=np.arange(shape[0]), mu_s=np.arange(shape[1])).to_dataset()
@@ -334,16 +435,23 @@ def test_flags_are_the_bits(folder: Path, chunks: dict[str, int] | None) -> None
     with xr.open_dataset(folder / "grid.nc", chunks=chunks) as data:
         flags = slipsweep.flags(data)
         kinds = [flags[name].attrs["kind"] for name in flags.data_vars]
-        assert sorted(map(str, flags.data_vars)) == sorted((flag.name or "").lower() for flag in Validity)
+        assert sorted(map(str, flags.data_vars)) == sorted(
+            (flag.name or "").lower() for flag in Validity
+        )
         assert kinds == ["no value"] * 5 + ["caution"] * 4 + ["note"] * 2
         assert flags.uplift.dims == data.validity.dims
         assert bool(flags.chunks) == (chunks is not None)  # lazy data stay lazy
         assert flags.statically_unstable.any()
-        together = sum(int(flag) * flags[(flag.name or "").lower()].astype(int) for flag in Validity)
+        together = sum(
+            int(flag) * flags[(flag.name or "").lower()].astype(int) for flag in Validity
+        )
         xr.testing.assert_equal(together, data.validity.astype(int))
         xr.testing.assert_identical(flags, slipsweep.flags(data.validity))
         for flag in Validity:
-            assert flags[(flag.name or "").lower()].attrs == {"long_name": flag.text, "kind": str(flag.kind)}
+            assert flags[(flag.name or "").lower()].attrs == {
+                "long_name": flag.text,
+                "kind": str(flag.kind),
+            }
 
 
 @pytest.mark.parametrize(
@@ -360,7 +468,8 @@ def test_what_has_no_flags(data: xr.Dataset | xr.DataArray, message: str) -> Non
 
 def test_words_of_one_cell(folder: Path, tmp_path: Path) -> None:
     """A file without dimensions is a table of one row."""
-    cell, path = tmp_path / "cell.nc", tmp_path / "t.csv"
+    cell = tmp_path / "cell.nc"
+    path = tmp_path / "t.csv"
     with xr.open_dataset(folder / "cases.nc", mask_and_scale=False) as data:
         data.isel(case=0, frequency=1).to_netcdf(cell)
     assert export.export(cell, path, words=True) == 1

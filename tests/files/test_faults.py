@@ -17,6 +17,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, bytes]:
 
 @pytest.mark.parametrize("output", OUTPUTS)
 @pytest.mark.parametrize("fault", FAULTS)
-def test_nothing_is_lost_but_the_chunk_in_work(folder: tuple[Path, bytes], fault: str, output: str) -> None:
+def test_nothing_is_lost_but_the_chunk_in_work(
+    folder: tuple[Path, bytes], fault: str, output: str
+) -> None:
     path, whole = folder
     FAULTS[fault](path, output, whole, random.Random(output))

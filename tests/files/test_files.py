@@ -56,7 +56,10 @@ SUITE = f"""
 records = "motions"
 """
 
-PAIRS = SUITE.replace('"motions"', '[["motions/a.csv", "motions/Düzce.csv"]]') + "[axes.azimuth]\nvalues = [0, 45]\n"
+PAIRS = (
+    SUITE.replace('"motions"', '[["motions/a.csv", "motions/Düzce.csv"]]')
+    + "[axes.azimuth]\nvalues = [0, 45]\n"
+)
 
 #: Statistics, with samples that have no value and a slope on which none has.
 STATISTICS = """
@@ -70,13 +73,25 @@ sensitivity = true
 mu_s = {distribution = "lognorm", s = 0.2, scale = 0.3}
 """
 
-SWEEPS = {"grid": GRID, "cases": CASES, "statistics": STATISTICS, "record": RECORD, "suite": SUITE, "pairs": PAIRS}
+SWEEPS = {
+    "grid": GRID,
+    "cases": CASES,
+    "statistics": STATISTICS,
+    "record": RECORD,
+    "suite": SUITE,
+    "pairs": PAIRS,
+}
 NAMES = (*SWEEPS, "history")
 
 
 def run(*arguments: str | Path, folder: Path) -> str:
     done = subprocess.run(
-        [*map(str, arguments)], cwd=folder, capture_output=True, encoding="utf-8", timeout=300, check=False
+        [*map(str, arguments)],
+        cwd=folder,
+        capture_output=True,
+        encoding="utf-8",
+        timeout=300,
+        check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
@@ -89,12 +104,16 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "motions").mkdir()
     for name, sign in (("a", 1), ("Düzce", -1)):
         rows = (f"{at / 20},{sign * 3 * (at % 7 - 3)}\n" for at in range(60 + sign))
-        (folder / "motions" / f"{name}.csv").write_text("time (s),acceleration (m/s2)\n" + "".join(rows))
+        (folder / "motions" / f"{name}.csv").write_text(
+            "time (s),acceleration (m/s2)\n" + "".join(rows)
+        )
     for name, text in SWEEPS.items():
         (folder / f"{name}.toml").write_text(text, encoding="utf-8")
         assert command(folder, "run", f"{name}.toml", "--quiet").returncode == 0
     block = ("--theta", "5", "--mu-s", "0.38", "--amplitude", "3.55", "--frequency", "1.8")
-    done = command(folder, "simulate", *block, "--cycles", "2", "--points", "16", "-o", "history.nc", "--quiet")
+    done = command(
+        folder, "simulate", *block, "--cycles", "2", "--points", "16", "-o", "history.nc", "--quiet"
+    )
     assert done.returncode == 0
     return folder
 
@@ -103,13 +122,21 @@ def numbers(path: Path) -> dict[str, np.ndarray]:
     """The numeric variables of a file as they are stored."""
     with netCDF4.Dataset(path) as file:
         file.set_auto_maskandscale(False)
-        return {name: np.asarray(variable[...]) for name, variable in file.variables.items() if variable.dtype != "S1"}
+        return {
+            name: np.asarray(variable[...])
+            for name, variable in file.variables.items()
+            if variable.dtype != "S1"
+        }
 
 
 def filled(path: Path) -> set[str]:
     """The whole numbers in which a fill value stands for what is missing."""
     with netCDF4.Dataset(path) as file:
-        return {name for name, v in file.variables.items() if v.dtype.kind == "i" and "_FillValue" in v.ncattrs()}
+        return {
+            name
+            for name, v in file.variables.items()
+            if v.dtype.kind == "i" and "_FillValue" in v.ncattrs()
+        }
 
 
 def program(name: str) -> str:
@@ -124,19 +151,27 @@ def test_the_files_hold_what_is_to_be_read(files: Path) -> None:
     assert {*stored["sliding_mode"].flat} == {-1, 0, 1, 2}
     assert np.isnan(stored["permanent_displacement"]).any()
     assert np.isnan(numbers(files / "statistics.nc")["displacement_quantile"]).any()
-    assert np.bitwise_or.reduce(stored["validity"], axis=None) & (1 | 16 | 64 | 128) == (1 | 16 | 64 | 128)
+    assert np.bitwise_or.reduce(stored["validity"], axis=None) & (1 | 16 | 64 | 128) == (
+        1 | 16 | 64 | 128
+    )
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_cf_checker_finds_nothing(files: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    runner = pytest.importorskip("compliance_checker.runner", reason="compliance-checker is not installed")
+def test_the_cf_checker_finds_nothing(
+    files: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    runner = pytest.importorskip(
+        "compliance_checker.runner", reason="compliance-checker is not installed"
+    )
     suite = runner.CheckSuite
     suite.load_all_available_checkers()
 
     def no_network(*arguments: object, **options: object) -> None:
         raise AssertionError("the checker wants the network")
 
-    monkeypatch.setattr("requests.sessions.Session.request", no_network)  # its own table of standard names will do
+    monkeypatch.setattr(
+        "requests.sessions.Session.request", no_network
+    )  # its own table of standard names will do
     newest = max(
         (checker for checker in suite.checkers if re.fullmatch(r"cf:1\.\d+", checker)),
         key=lambda checker: int(checker.rpartition(".")[2]),
@@ -147,7 +182,9 @@ def test_the_cf_checker_finds_nothing(files: Path, name: str, monkeypatch: pytes
     assert not errors
     assert len(scores) > 20
     # a check that passes may still have something to tell
-    failed = [score for score in scores if score.value is not True and score.value[0] != score.value[1]]
+    failed = [
+        score for score in scores if score.value is not True and score.value[0] != score.value[1]
+    ]
     told = [message for score in failed for message in score.msgs]
     assert told == [], [(score.name, score.msgs) for score in failed]
 
@@ -168,7 +205,9 @@ def test_history_times_are_seconds(files: Path, name: str) -> None:
 
 def listed(text: str, name: str) -> list[str]:
     """The values of a variable in CDL."""
-    found = re.search(rf"^ ?{name} =\s*(.*?) ;", text.partition("\ndata:\n")[2], re.MULTILINE | re.DOTALL)
+    found = re.search(
+        rf"^ ?{name} =\s*(.*?) ;", text.partition("\ndata:\n")[2], re.MULTILINE | re.DOTALL
+    )
     assert found is not None, name
     return found[1].replace(",", " ").split()
 
@@ -176,7 +215,9 @@ def listed(text: str, name: str) -> list[str]:
 def same(words: list[str], stored: np.ndarray, missing: str = "", fills: bool = False) -> None:
     """Compare printed values with those stored; `missing` is what a program prints for a fill value, if it `fills`."""
     read = np.array([float(word) if word != missing else np.nan for word in words]).astype(
-        stored.dtype if stored.dtype.kind == "f" else float  # 17 and 9 digits bring a double and a float back exactly
+        stored.dtype
+        if stored.dtype.kind == "f"
+        else float  # 17 and 9 digits bring a double and a float back exactly
     )
     expected = stored.ravel().astype(read.dtype)
     if fills:
@@ -208,7 +249,9 @@ def test_nco_reads_every_variable(files: Path, name: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_cdo_reads_every_variable(files: Path, name: str) -> None:
     """CDO knows three dimensions beside time; of larger grids NCO cuts slices for it."""
-    cdo, ncks, ncwa = program("cdo"), program("ncks"), program("ncwa")
+    cdo = program("cdo")
+    ncks = program("ncks")
+    ncwa = program("ncwa")
     with read_result(files / f"{name}.nc") as table:
         coordinates = {*table.coords}
     with netCDF4.Dataset(files / f"{name}.nc") as file:
@@ -227,7 +270,10 @@ def test_cdo_reads_every_variable(files: Path, name: str) -> None:
             run(ncwa, "-O", "-a", ",".join(cut), "cut.nc", path, folder=files)
         for variable in stored.keys() - coordinates:  # these are grids and levels to CDO
             text = run(cdo, "-s", "outputf,%.17g,1", f"-selname,{variable}", path, folder=files)
-            same(text.split(), stored[variable][tuple(where.get(dim, slice(None)) for dim in dims[variable])])
+            same(
+                text.split(),
+                stored[variable][tuple(where.get(dim, slice(None)) for dim in dims[variable])],
+            )
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -246,8 +292,13 @@ def test_octave_reads_every_variable(files: Path, name: str) -> None:
     script += f"printf('\\n%s\\n', ncreadatt('{name}.nc', '{flags}', 'flag_meanings'));\n"
     done = subprocess.run(
         [octave, "--no-gui", "--norc", "--quiet", "--eval", script],
-        cwd=files, env={**os.environ, "HOME": str(folder)}, capture_output=True, text=True, timeout=300, check=False,
-    )  # fmt: skip
+        cwd=files,
+        env={**os.environ, "HOME": str(folder)},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
     if "package netcdf" in done.stderr:
         pytest.skip("Octave has no package netcdf")
     assert done.returncode == 0, done.stderr
@@ -255,5 +306,6 @@ def test_octave_reads_every_variable(files: Path, name: str) -> None:
     assert masks.split() == [str(int(flag)) for flag in Validity]
     assert len(meanings.split()) == len(Validity)
     for key, values in stored.items():
-        # Octave's arrays have the dimensions in reverse and the first one runs fastest: the same order
+        # Octave's arrays have the dimensions in reverse and the first one runs fastest: the same
+        # order
         same((folder / key).read_text().split(), values, "NaN", key in filled(files / f"{name}.nc"))

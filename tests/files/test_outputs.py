@@ -71,7 +71,9 @@ def test_no_command_writes_what_it_reads(
         text = refused(capfd, "run", "a.nc", "-o", output, "--overwrite")
         assert f"{output}: writing it would replace a.nc, which this command reads" in text
     assert Path("a.nc").read_bytes() == before
-    assert "is given twice" in refused(capfd, "chart", "a.nc", "--kind", "contours", "-o", "b.png", "-o", "b.png")
+    assert "is given twice" in refused(
+        capfd, "chart", "a.nc", "--kind", "contours", "-o", "b.png", "-o", "b.png"
+    )
 
 
 def test_a_folder_that_is_no_store_is_kept(folder: Path, tmp_path: Path) -> None:
@@ -81,7 +83,9 @@ def test_a_folder_that_is_no_store_is_kept(folder: Path, tmp_path: Path) -> None
         outputs.check_outputs([tmp_path / "b.zarr"], True, reads=())
 
 
-def write(path: Path, overwrite: bool, failure: OSError | None = None, theirs: str | None = None) -> None:
+def write(
+    path: Path, overwrite: bool, failure: OSError | None = None, theirs: str | None = None
+) -> None:
     """Write a file, in which a failure or another process may interfere."""
     with outputs.complete_or_absent(path, overwrite) as temporary:
         temporary.write_text("mine")
@@ -93,9 +97,14 @@ def write(path: Path, overwrite: bool, failure: OSError | None = None, theirs: s
 
 def test_complete_or_absent(tmp_path: Path) -> None:
     path = tmp_path / "a.txt"
-    with pytest.raises(RunError, match=r"a\.txt: writing failed: No space left on device \(.* free on the disk\)"):
+    with pytest.raises(
+        RunError, match=r"a\.txt: writing failed: No space left on device \(.* free on the disk\)"
+    ):
         write(path, False, OSError(28, "No space left on device"))
-    with pytest.raises(RunError, match=r"failed: Not a directory$"), outputs.writing("/proc/self/a.nc"):  # has no size
+    with (
+        pytest.raises(RunError, match=r"failed: Not a directory$"),
+        outputs.writing("/proc/self/a.nc"),
+    ):  # has no size
         raise OSError(20, "Not a directory")
     assert not list(tmp_path.iterdir())
     with pytest.raises(RunError, match="was made by another process during the run"):

@@ -13,7 +13,9 @@ SWEEPS = Path(__file__).parents[2] / "sweeps"
 def test_all_of_them_are_listed(tmp_path: Path) -> None:
     done = command(tmp_path, "example")
     assert done.returncode == 0
-    assert [line.split()[0] for line in done.stdout.splitlines()] == sorted(path.stem for path in SWEEPS.glob("*.toml"))
+    assert [line.split()[0] for line in done.stdout.splitlines()] == sorted(
+        path.stem for path in SWEEPS.glob("*.toml")
+    )
     assert not any(tmp_path.iterdir())
 
 

@@ -140,33 +140,69 @@ def test_g_as_a_unit_is_the_gravity_of_the_model() -> None:
 BAD = {
     # keys
     "unknown table": ("[sovler]\n" + GOOD, 'sovler: unknown key; did you mean "solver"?'),
-    "unknown axis": (GOOD.replace("theta", "thetta"), 'axes.thetta: unknown key; did you mean "theta"?'),
-    "unknown key": (axis("theta", "strat = 0"), 'axes.theta.strat: unknown key; did you mean "start"?'),
-    "unknown key in a case": (CASES.replace("theta = 6", "thet = 6"), "cases[row 2].thet: unknown key; did you mean"),
+    "unknown axis": (
+        GOOD.replace("theta", "thetta"),
+        'axes.thetta: unknown key; did you mean "theta"?',
+    ),
+    "unknown key": (
+        axis("theta", "strat = 0"),
+        'axes.theta.strat: unknown key; did you mean "start"?',
+    ),
+    "unknown key in a case": (
+        CASES.replace("theta = 6", "thet = 6"),
+        "cases[row 2].thet: unknown key; did you mean",
+    ),
     "missing axis": (GOOD.replace("mu_s", "# mu_s"), "mu_s: must be given"),
-    "missing amplitude": (GOOD.replace("amplitude", "# amplitude"), "exactly one of them must be given"),
+    "missing amplitude": (
+        GOOD.replace("amplitude", "# amplitude"),
+        "exactly one of them must be given",
+    ),
     "missing stop": (axis("theta", "start = 0, num = 3"), "axes.theta.stop: missing"),
     # types
-    "text for a number": (axis("theta", 'values = ["a"]'), "axes.theta.values = ['a']: must be a number"),
+    "text for a number": (
+        axis("theta", 'values = ["a"]'),
+        "axes.theta.values = ['a']: must be a number",
+    ),
     "number for a list": (axis("theta", "values = 3"), "axes.theta.values = 3: must be a list"),
     "number for a table": ("axes = 3", "axes = 3: must be a table"),
-    "fraction of a point": (axis("theta", "start = 0, stop = 1, num = 2.5"), "axes.theta.num = 2.5: must be"),
-    "wrong word": (GOOD + '[model]\nrise = "slow"', "model.rise = 'slow': must be one of 'monotone', 'literal'"),
+    "fraction of a point": (
+        axis("theta", "start = 0, stop = 1, num = 2.5"),
+        "axes.theta.num = 2.5: must be",
+    ),
+    "wrong word": (
+        GOOD + '[model]\nrise = "slow"',
+        "model.rise = 'slow': must be one of 'monotone', 'literal'",
+    ),
     "waveform": (
         GOOD + '[excitation]\nwaveform = "sawtooth"',
         "excitation.waveform = 'sawtooth': must be one of 'sine', 'cosine', 'triangle', 'square', 'harmonics'",
     ),
-    "variable": (GOOD + '[output]\nvariables = ["validty"]', "variables = 'validty': must be one of"),
+    "variable": (
+        GOOD + '[output]\nvariables = ["validty"]',
+        "variables = 'validty': must be one of",
+    ),
     "number for a path": (GOOD + "[output]\npath = 3", "output.path = 3: must be a text"),
     # axes
-    "empty": (axis("theta", "values = []"), "axes.theta.values = []: must be a list of one number at least"),
-    "unsorted": (axis("mu_s", "values = [0.5, 0.4]"), "axes.mu_s.values: 0.4 after 0.5: must increase"),
-    "backwards": (axis("theta", "start = 9, stop = 3, num = 4"), "axes.theta.stop = 3.0: must be greater than start"),
+    "empty": (
+        axis("theta", "values = []"),
+        "axes.theta.values = []: must be a list of one number at least",
+    ),
+    "unsorted": (
+        axis("mu_s", "values = [0.5, 0.4]"),
+        "axes.mu_s.values: 0.4 after 0.5: must increase",
+    ),
+    "backwards": (
+        axis("theta", "start = 9, stop = 3, num = 4"),
+        "axes.theta.stop = 3.0: must be greater than start",
+    ),
     "logarithm of zero": (
         axis("theta", 'start = 0, stop = 3, num = 4, spacing = "log"'),
         'axes.theta.start = 0.0: must be positive with spacing = "log"',
     ),
-    "two forms": (axis("theta", "values = [1, 2], num = 4"), "axes.theta.num: not allowed beside values"),
+    "two forms": (
+        axis("theta", "values = [1, 2], num = 4"),
+        "axes.theta.num: not allowed beside values",
+    ),
     # units
     "incompatible": (
         axis("theta", 'values = [1], units = "kg"'),
@@ -177,16 +213,40 @@ BAD = {
         'axes.displacement_amplitude.units = "g": must be a unit that converts to m',
     ),
     # range
-    "not a number": (axis("theta", "values = [nan]"), "axes.theta.values = nan: must be 0 <= theta < 90"),
-    "theta": (axis("theta", "values = [0, 90]"), "axes.theta.values = 90: must be 0 <= theta < 90 degrees"),
-    "mu_s": (axis("mu_s", "start = 0, stop = 1, num = 3"), "axes.mu_s = 0: must be a finite number > 0"),
-    "cycles": (GOOD + "[excitation]\ncycles = 0", "excitation.cycles = 0: must be a whole number >= 1"),
-    "decay rate": (GOOD + "[model]\ndecay_rate = -1", "model.decay_rate = -1: must be a finite number >= 0"),
+    "not a number": (
+        axis("theta", "values = [nan]"),
+        "axes.theta.values = nan: must be 0 <= theta < 90",
+    ),
+    "theta": (
+        axis("theta", "values = [0, 90]"),
+        "axes.theta.values = 90: must be 0 <= theta < 90 degrees",
+    ),
+    "mu_s": (
+        axis("mu_s", "start = 0, stop = 1, num = 3"),
+        "axes.mu_s = 0: must be a finite number > 0",
+    ),
+    "cycles": (
+        GOOD + "[excitation]\ncycles = 0",
+        "excitation.cycles = 0: must be a whole number >= 1",
+    ),
+    "decay rate": (
+        GOOD + "[model]\ndecay_rate = -1",
+        "model.decay_rate = -1: must be a finite number >= 0",
+    ),
     # tables against each other
     "given twice": (GOOD + "[[cases]]\ntheta = 5", "cases.theta: given twice"),
-    "twice, model": (GOOD + "[model]\ndelta_mu = 1\n[axes.delta_mu]\nvalues = [1]", "model.delta_mu: given twice"),
-    "key missing in a row": (CASES.replace("theta = 6", ""), "cases[row 2].theta: every row must give what row 1"),
-    "range in a row": (CASES.replace("theta = 6", "theta = 99"), "cases[row 2].theta = 99: must be 0 <= theta"),
+    "twice, model": (
+        GOOD + "[model]\ndelta_mu = 1\n[axes.delta_mu]\nvalues = [1]",
+        "model.delta_mu: given twice",
+    ),
+    "key missing in a row": (
+        CASES.replace("theta = 6", ""),
+        "cases[row 2].theta: every row must give what row 1",
+    ),
+    "range in a row": (
+        CASES.replace("theta = 6", "theta = 99"),
+        "cases[row 2].theta = 99: must be 0 <= theta",
+    ),
     "empty row": (GOOD + "[[cases]]", "cases[row 1]: must give at least one parameter"),
     "rise of newmark": (
         GOOD + '[model]\nfriction = "newmark"\nrise = "literal"',
@@ -196,10 +256,16 @@ BAD = {
         GOOD + '[excitation]\nrecord = "a.csv"\ncycles = 2',
         "excitation.cycles: not allowed with excitation.record",
     ),
-    "reading without a record": (GOOD + "[excitation]\ngaps = 'linear'", "excitation.gaps: only beside excitation.rec"),
+    "reading without a record": (
+        GOOD + "[excitation]\ngaps = 'linear'",
+        "excitation.gaps: only beside excitation.rec",
+    ),
     "no variables": (GOOD + "[output]\nvariables = []", "variables = []: must name one of"),
     # TOML
-    "syntax": ("[axes.theta]\nvalues = [1,\nb", "not valid TOML: Invalid value (at line 3, column 1)"),
+    "syntax": (
+        "[axes.theta]\nvalues = [1,\nb",
+        "not valid TOML: Invalid value (at line 3, column 1)",
+    ),
 }
 
 
@@ -222,14 +288,18 @@ def test_bad_files_are_refused_in_one_line(text: str, message: str) -> None:
         ("a.toml", b"\x89HDF nothing more", "not a netCDF file"),
     ],
 )
-def test_files_of_another_kind_are_refused(tmp_path: Path, name: str, content: bytes, message: str) -> None:
+def test_files_of_another_kind_are_refused(
+    tmp_path: Path, name: str, content: bytes, message: str
+) -> None:
     (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError, match=message):
         spec.load(tmp_path / name)
 
 
 @pytest.mark.parametrize(
-    "path", sorted((Path(__file__).parents[2] / "sweeps").glob("*.toml")), ids=lambda path: path.stem
+    "path",
+    sorted((Path(__file__).parents[2] / "sweeps").glob("*.toml")),
+    ids=lambda path: path.stem,
 )
 def test_the_sweeps_that_come_along_are_good(path: Path) -> None:
     sweep = spec.load(path)
@@ -241,12 +311,15 @@ def test_the_measured_interface_takes_no_estimate_and_holds_the_tests() -> None:
     """Its two cases, at the amplitude and frequency of their tests, are those of sweeps/paper.toml."""
     sweeps = Path(__file__).parents[2] / "sweeps"
     plan = spec.load(sweeps / "interface.toml").plan()
-    table, paper = plan.solve(), spec.load(sweeps / "paper.toml").plan().solve()
+    table = plan.solve()
+    paper = spec.load(sweeps / "paper.toml").plan().solve()
     assert table.attrs["friction_inputs"] == "Üy, λ, Δμ given"
     flags = np.bitwise_or.reduce(table["validity"].values, axis=None)
     assert not flags & (variables.Validity.FRICTION_ESTIMATED | variables.VALUELESS)
     for case in range(2):
-        amplitude, frequency = (float(paper[name].values[case]) for name in ("amplitude", "frequency"))
+        amplitude, frequency = (
+            float(paper[name].values[case]) for name in ("amplitude", "frequency")
+        )
         at = [
             int(np.abs(table[name].values - value).argmin())
             for name, value in (("amplitude", amplitude), ("frequency", frequency))

@@ -35,7 +35,8 @@ STUDIES = {
 variables = ["permanent_displacement", "newmark_displacement", "limiting_acceleration", "sliding_mode", "validity"]
 """,
     "newmark": WAVE + '[model]\nfriction = "newmark"\n',
-    "step": WAVE + '[solver]\nmethod = "step"\nsteps_per_cycle = 64\n[excitation]\nwaveform = "triangle"\n',
+    "step": WAVE
+    + '[solver]\nmethod = "step"\nsteps_per_cycle = 64\n[excitation]\nwaveform = "triangle"\n',
     "cases": """
 cases = [{label = "mild ± slope, wet", theta = 5, amplitude = 3}, {label = "steep", theta = 25, amplitude = 5}]
 axes.mu_s.values = [0.3, 0.5, 0.7]
@@ -43,7 +44,8 @@ axes.frequency.values = [1, 2]
 """,
     "record": GRID + '[excitation]\nrecord = "motions/m1.csv"\nunits = "g"\npolarity = "both"\n',
     "suite": GRID + '[excitation]\nrecords = ["motions/*.csv"]\nunits = "g"\n',
-    "samples": WAVE + "[uncertainty]\nsamples = 16\ndecay_rate = {distribution = 'lognorm', s = 0.3, scale = 2.0}\n",
+    "samples": WAVE
+    + "[uncertainty]\nsamples = 16\ndecay_rate = {distribution = 'lognorm', s = 0.3, scale = 2.0}\n",
 }
 
 
@@ -81,17 +83,24 @@ def without_time(table: xr.Dataset) -> xr.Dataset:
 
 @pytest.mark.parametrize("output", ["b.nc", "b.zarr"])
 @pytest.mark.parametrize("study", [*STUDIES, "limits"])
-def test_every_study_runs_every_way(folder: Path, study: str, output: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_study_runs_every_way(
+    folder: Path, study: str, output: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     job = job_of(folder, study)
     whole = stored(job, folder / "a.nc")
     monkeypatch.setattr(running, "CHUNK_CELLS", int(8 * job.plan.cost) + 1)
     parts = stored(job_of(folder, study), folder / output)
-    one, other = read_result(folder / "a.nc"), read_result(folder / output)
+    one = read_result(folder / "a.nc")
+    other = read_result(folder / output)
     xr.testing.assert_identical(without_time(other), without_time(one))
     assert not list(folder.glob("*.part"))
     assert (parts.tally.modes, parts.tally.flags) == (whole.tally.modes, whole.tally.flags)
     again = tally_of(one)
-    assert (again.modes, again.flags, again.cells) == (whole.tally.modes, whole.tally.flags, whole.tally.cells)
+    assert (again.modes, again.flags, again.cells) == (
+        whole.tally.modes,
+        whole.tally.flags,
+        whole.tally.cells,
+    )
     # a result repeats its run, and has the values of Python's own functions
     if study != "limits" and output == "b.zarr":
         stored(sweep_job(spec.load(folder / output)), folder / "c.nc")
@@ -113,9 +122,13 @@ def test_a_file_in_chunks_is_compressed(folder: Path, monkeypatch: pytest.Monkey
 
 
 @pytest.mark.parametrize("output", ["a[1].nc", "a[1].zarr"])
-def test_a_run_goes_on_with_its_own_chunks_only(folder: Path, output: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_goes_on_with_its_own_chunks_only(
+    folder: Path, output: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(running, "CHUNK_CELLS", 6)
-    path, mark, seen = folder / output, storing._mark, []
+    path = folder / output
+    mark = storing._mark
+    seen = []
 
     def failing(place: str, number: int) -> None:
         if number == 3:
@@ -134,7 +147,8 @@ def test_a_run_goes_on_with_its_own_chunks_only(folder: Path, output: str, monke
     monkeypatch.setattr(storing, "_mark", noting)
 
     with pytest.raises(
-        InputError, match=r"part: has chunks of an interrupted run; give --resume to go on with them, or --ov"
+        InputError,
+        match=r"part: has chunks of an interrupted run; give --resume to go on with them, or --ov",
     ):
         stored(job_of(folder, "sweep"), path)
     with pytest.raises(InputError, match="has chunks of another sweep file; go on with that one"):
@@ -155,10 +169,14 @@ def test_a_run_goes_on_with_its_own_chunks_only(folder: Path, output: str, monke
         stored(job_of(folder, "sweep"), path, resume=True)
     kept.rename(identity)
     monkeypatch.setattr(running, "CHUNK_CELLS", 2)  # as with workers
-    assert not stored(job_of(folder, "sweep"), path, resume=True).found  # with the chunks it was begun with
+    assert not stored(
+        job_of(folder, "sweep"), path, resume=True
+    ).found  # with the chunks it was begun with
     assert sorted(seen) == list(range(24))
     stored(job_of(folder, "sweep"), folder / "whole.nc")
-    xr.testing.assert_identical(without_time(read_result(path)), without_time(read_result(folder / "whole.nc")))
+    xr.testing.assert_identical(
+        without_time(read_result(path)), without_time(read_result(folder / "whole.nc"))
+    )
 
     assert stored(job_of(folder, "sweep"), path, resume=True).found
     with pytest.raises(InputError, match="is of another sweep or version; give --overwrite"):
@@ -178,7 +196,10 @@ def test_another_motion_is_another_run(folder: Path, monkeypatch: pytest.MonkeyP
     with pytest.raises(InputError, match="another sweep or version"):
         stored(job_of(folder, "suite"), folder / "a.nc", resume=True)
     step, sweep = (spec.load(folder / f"{name}.toml") for name in ("step", "sweep"))
-    assert sweep_job(step).digest != sweep_job(replace(step, solver=slipsweep.Step(steps_per_cycle=128))).digest
+    assert (
+        sweep_job(step).digest
+        != sweep_job(replace(step, solver=slipsweep.Step(steps_per_cycle=128))).digest
+    )
     assert limit_job(sweep, [0.01], 8.0).digest != limit_job(sweep, [0.01], 9.0).digest
 
 
@@ -194,11 +215,15 @@ def test_what_no_disk_and_no_memory_holds(folder: Path) -> None:
         stored(job_of(folder, "sweep"), folder / "a.nc", memory=100_000_000)
 
 
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="asks Linux for the memory of a process")
+@pytest.mark.skipif(
+    not Path("/proc/self/status").exists(), reason="asks Linux for the memory of a process"
+)
 @pytest.mark.parametrize("output", ["a.nc", "a.zarr"])
 def test_memory_is_what_is_asked_for(folder: Path, output: str) -> None:
     """A run in chunks takes no more than --memory says, and a tenth; codes are stored as whole numbers."""
-    text = WAVE.replace("num = 4", "num = 2000").replace("[0.5, 1, 2]", str([0.01 * i + 1 for i in range(600)]))
+    text = WAVE.replace("num = 4", "num = 2000").replace(
+        "[0.5, 1, 2]", str([0.01 * i + 1 for i in range(600)])
+    )
     (folder / "a.toml").write_text(text)
     code = (
         "import sys; from pathlib import Path; from slipsweep.cli import main; "
@@ -206,7 +231,9 @@ def test_memory_is_what_is_asked_for(folder: Path, output: str) -> None:
         # not of getrusage: what that tells of a process begins with the memory of its parent
         "print(Path('/proc/self/status').read_text().partition('VmHWM:')[2].split()[0])"
     )
-    done = subprocess.run([sys.executable, "-c", code, output], cwd=folder, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code, output], cwd=folder, capture_output=True, text=True, check=True
+    )
     assert int(done.stdout) * 1024 < 1.1 * 460e6
     how: Any = {"engine": "zarr", "consolidated": False} if output.endswith("zarr") else {}
     with xr.open_dataset(folder / output, mask_and_scale=False, **how) as file:
@@ -219,14 +246,18 @@ def test_memory_is_what_is_asked_for(folder: Path, output: str) -> None:
 def test_workers_give_the_same_bits(folder: Path, output: str) -> None:
     stored(job_of(folder, "sweep"), folder / "a.nc")
     stored(job_of(folder, "sweep"), folder / output, workers=1)
-    xr.testing.assert_identical(without_time(read_result(folder / output)), without_time(read_result(folder / "a.nc")))
+    xr.testing.assert_identical(
+        without_time(read_result(folder / output)), without_time(read_result(folder / "a.nc"))
+    )
 
 
 def test_a_store_at_an_address(folder: Path) -> None:
     address = "memory://bucket/address.zarr"
     stored(job_of(folder, "sweep"), address)
     stored(job_of(folder, "sweep"), folder / "a.nc")
-    xr.testing.assert_identical(without_time(read_result(address)), without_time(read_result(folder / "a.nc")))
+    xr.testing.assert_identical(
+        without_time(read_result(address)), without_time(read_result(folder / "a.nc"))
+    )
     assert stored(job_of(folder, "sweep"), address, resume=True).found
     assert not list(Path().glob(".address*"))
     with pytest.raises(InputError, match=r"nowhere://a/b\.zarr: Protocol not known: nowhere"):
@@ -234,7 +265,10 @@ def test_a_store_at_an_address(folder: Path) -> None:
 
 
 def test_clusters_that_are_none(folder: Path) -> None:
-    for means, message in (({"workers": 0}, "must be from 1 to"), ({"workers": 2, "scheduler": "a:1"}, "give one of")):
+    for means, message in (
+        ({"workers": 0}, "must be from 1 to"),
+        ({"workers": 2, "scheduler": "a:1"}, "give one of"),
+    ):
         with pytest.raises(InputError, match=message):
             stored(job_of(folder, "sweep"), folder / "a.nc", **means)
 
@@ -247,7 +281,9 @@ def test_results_open_as_sweep_returns_them(folder: Path) -> None:
     opened = slipsweep.open_result(folder / "a.nc")
     assert all(one.chunks is not None for one in opened.data_vars.values())
     arguments = {"theta": [0, 5, 10], "mu_s": [0.3, 0.5], "amplitude": opened.amplitude.values}
-    expected = slipsweep.sweep(**arguments, frequency=[0.5, 1, 2], variables=list(map(str, opened.data_vars)))
+    expected = slipsweep.sweep(
+        **arguments, frequency=[0.5, 1, 2], variables=list(map(str, opened.data_vars))
+    )
     xr.testing.assert_equal(opened, expected)
     assert opened.sliding_mode.dtype == expected.sliding_mode.dtype == np.int8
     for name in opened.data_vars:
@@ -265,7 +301,9 @@ EDITS = {
     "packed": packed,
     "transposed": lambda table: table.transpose(*reversed(table.permanent_displacement.dims)),
     "codes as numbers": lambda table: table.assign(sliding_mode=table.sliding_mode.astype(float)),
-    "single precision": lambda table: table.astype("float32", keep_attrs=True).assign(validity=table.validity),
+    "single precision": lambda table: table.astype("float32", keep_attrs=True).assign(
+        validity=table.validity
+    ),
 }
 
 
@@ -281,7 +319,9 @@ def test_what_other_programs_have_rewritten(folder: Path, edit: str) -> None:
         whole.permanent_displacement,
         atol=2e-5,
     )
-    np.testing.assert_array_equal(again.sliding_mode.transpose(*whole.sliding_mode.dims), whole.sliding_mode)
+    np.testing.assert_array_equal(
+        again.sliding_mode.transpose(*whole.sliding_mode.dims), whole.sliding_mode
+    )
 
 
 @pytest.mark.parametrize(

@@ -14,13 +14,17 @@ import slipsweep
 
 @pytest.fixture(scope="module")
 def result() -> xr.Dataset:
-    return slipsweep.sweep(theta=[2.0, 5.0], mu_s=[0.3, 0.4], amplitude=[2.0, 5.0, 9.0], frequency=2.0)
+    return slipsweep.sweep(
+        theta=[2.0, 5.0], mu_s=[0.3, 0.4], amplitude=[2.0, 5.0, 9.0], frequency=2.0
+    )
 
 
 def test_copies_are_the_result_again(result: xr.Dataset) -> None:
     for again in (pickle.loads(pickle.dumps(result)), copy.deepcopy(result)):
         xr.testing.assert_identical(again, result)
-    lazy = slipsweep.sweep(theta=[2.0, 5.0], mu_s=[0.3, 0.4], amplitude=[2.0, 5.0, 9.0], frequency=2.0, chunks=2)
+    lazy = slipsweep.sweep(
+        theta=[2.0, 5.0], mu_s=[0.3, 0.4], amplitude=[2.0, 5.0, 9.0], frequency=2.0, chunks=2
+    )
     xr.testing.assert_equal(pickle.loads(pickle.dumps(lazy)).compute(), result)
 
 
@@ -33,7 +37,11 @@ def test_a_row_a_cell(result: xr.Dataset) -> None:
 
 @pytest.mark.parametrize("chunks", [None, 2])
 def test_functions_of_arrays(result: xr.Dataset, chunks: int | None) -> None:
-    values = result.permanent_displacement if chunks is None else result.permanent_displacement.chunk(chunks)
+    values = (
+        result.permanent_displacement
+        if chunks is None
+        else result.permanent_displacement.chunk(chunks)
+    )
     rooted = xr.apply_ufunc(np.sqrt, values, dask="parallelized", output_dtypes=[float])
     assert (rooted.chunks is None) == (chunks is None)
     np.testing.assert_array_equal(rooted, np.sqrt(result.permanent_displacement))
@@ -53,10 +61,14 @@ def test_units_by_pint_xarray(result: xr.Dataset, tmp_path: Path) -> None:
     for one in (result, slipsweep.open_result(tmp_path / "a.nc").load()):
         found = one.pint.quantify()
         millimetres = found.pint.to(permanent_displacement="mm").permanent_displacement
-        np.testing.assert_allclose(millimetres.pint.magnitude, 1e3 * result.permanent_displacement, rtol=1e-14)
+        np.testing.assert_allclose(
+            millimetres.pint.magnitude, 1e3 * result.permanent_displacement, rtol=1e-14
+        )
         in_g = found.amplitude.pint.to("standard_gravity")
         again = slipsweep.sweep(theta=found.theta, mu_s=found.mu_s, amplitude=in_g, frequency=2.0)
-        np.testing.assert_allclose(again.permanent_displacement, result.permanent_displacement, rtol=1e-12)
+        np.testing.assert_allclose(
+            again.permanent_displacement, result.permanent_displacement, rtol=1e-12
+        )
         assert found.pint.dequantify(format="cf").amplitude.attrs["units"] == "m s-2"
 
 

@@ -75,17 +75,25 @@ def test_scalars_become_scalar_coordinates() -> None:
     assert result.sizes == {}
     assert result.permanent_displacement.shape == ()
     assert {name: result[name].item() for name in result.coords} == {
-        "theta": 5.0, "mu_s": 0.38, "amplitude": 3.55, "frequency": 1.8, "yield_acceleration": 0.59,
-    }  # fmt: skip
+        "theta": 5.0,
+        "mu_s": 0.38,
+        "amplitude": 3.55,
+        "frequency": 1.8,
+        "yield_acceleration": 0.59,
+    }
 
 
-@pytest.mark.parametrize("kind", [list, tuple, np.array, lambda x: np.array(x, np.float32)[::-1][::-1], range])
+@pytest.mark.parametrize(
+    "kind", [list, tuple, np.array, lambda x: np.array(x, np.float32)[::-1][::-1], range]
+)
 def test_any_row_of_numbers_is_an_axis(kind: Any) -> None:
     row = kind(3) if kind is range else kind([0, 1, 2])
     result = slipsweep.sweep(row, 0.38, 3.5, 2.0)
     assert result.theta.dtype == np.float64
     np.testing.assert_array_equal(result.theta, [0, 1, 2])
-    expected = [slipsweep.sweep(theta, 0.38, 3.5, 2.0).permanent_displacement.item() for theta in (0, 1, 2)]
+    expected = [
+        slipsweep.sweep(theta, 0.38, 3.5, 2.0).permanent_displacement.item() for theta in (0, 1, 2)
+    ]
     np.testing.assert_array_equal(result.permanent_displacement, expected)
 
 
@@ -106,7 +114,9 @@ def test_an_array_of_two_dimensions_keeps_them() -> None:
     result = slipsweep.sweep([0.0, 5.0], 0.38, 4.0, frequency)
     assert result.permanent_displacement.dims == ("theta", "site", "mode")
     assert result.frequency.dims == ("site", "mode")
-    expected = slipsweep.sweep([0.0, 5.0], 0.38, 4.0, frequency.values.ravel()).permanent_displacement
+    expected = slipsweep.sweep(
+        [0.0, 5.0], 0.38, 4.0, frequency.values.ravel()
+    ).permanent_displacement
     np.testing.assert_array_equal(result.permanent_displacement, expected.values.reshape(2, 3, 2))
 
 
@@ -125,14 +135,21 @@ def test_parameters_are_copied() -> None:
 
 
 def test_displacement_amplitude() -> None:
-    frequency, displacement = np.array([0.5, 1.0, 2.0]), np.array([0.01, 0.05])
+    frequency = np.array([0.5, 1.0, 2.0])
+    displacement = np.array([0.01, 0.05])
     wanted = ["permanent_displacement", "acceleration_ratio", "amplitude"]
-    result = slipsweep.sweep(5.0, 0.38, frequency=frequency, displacement_amplitude=displacement, variables=wanted)
+    result = slipsweep.sweep(
+        5.0, 0.38, frequency=frequency, displacement_amplitude=displacement, variables=wanted
+    )
     assert result.permanent_displacement.dims == ("displacement_amplitude", "frequency")
-    np.testing.assert_allclose(result.amplitude, np.multiply.outer(displacement, (2 * np.pi * frequency) ** 2))
+    np.testing.assert_allclose(
+        result.amplitude, np.multiply.outer(displacement, (2 * np.pi * frequency) ** 2)
+    )
     assert result.amplitude.attrs == PARAMETERS["amplitude"]
     for i, j in np.ndindex(2, 3):
-        one = slipsweep.sweep(5.0, 0.38, result.amplitude.values[i, j], frequency[j], variables=wanted)
+        one = slipsweep.sweep(
+            5.0, 0.38, result.amplitude.values[i, j], frequency[j], variables=wanted
+        )
         for name in wanted[:2]:
             assert one[name].item() == result[name].values[i, j]
 
@@ -140,12 +157,16 @@ def test_displacement_amplitude() -> None:
 def test_a_grid_of_displacement_amplitudes_is_lazy() -> None:
     """4e10 amplitudes would take 320 GB."""
     given: dict[str, Any] = {
-        "theta": 5.0, "mu_s": 0.38,
-        "displacement_amplitude": np.linspace(0.01, 0.4, 200_000), "frequency": np.linspace(0.1, 3.0, 200_000),
-    }  # fmt: skip
+        "theta": 5.0,
+        "mu_s": 0.38,
+        "displacement_amplitude": np.linspace(0.01, 0.4, 200_000),
+        "frequency": np.linspace(0.1, 3.0, 200_000),
+    }
     with pytest.raises(InputError, match="of memory is free"):
         slipsweep.sweep(**given)
-    lazy = slipsweep.sweep(**given, chunks="auto", variables=["permanent_displacement", "amplitude"])
+    lazy = slipsweep.sweep(
+        **given, chunks="auto", variables=["permanent_displacement", "amplitude"]
+    )
     assert sum(coordinate.nbytes for coordinate in lazy.coords.values()) < 4e6
     assert lazy.amplitude.shape == lazy.permanent_displacement.shape == (200_000, 200_000)
 
@@ -157,20 +178,30 @@ def test_structure_frequency_sets_a_flag_and_no_more() -> None:
     ratio = result.frequency / result.structure_frequency
     flexible = (ratio >= 0.2) & (ratio <= 1.3)
     expected = plain.validity | (flexible * int(Validity.FLEXIBLE_BLOCK))
-    xr.testing.assert_equal(result.validity, expected.transpose(*result.validity.dims).astype("int16"))
+    xr.testing.assert_equal(
+        result.validity, expected.transpose(*result.validity.dims).astype("int16")
+    )
     for name in ("permanent_displacement", "sliding_mode"):
-        assert (result[name].isel(structure_frequency=0).values == plain[name].values).sum() == np.isfinite(
-            plain[name]
-        ).sum()
-    assert "validity" not in slipsweep.sweep(**AXES, structure_frequency=fs, variables=["sliding_mode"])
+        assert (
+            result[name].isel(structure_frequency=0).values == plain[name].values
+        ).sum() == np.isfinite(plain[name]).sum()
+    assert "validity" not in slipsweep.sweep(
+        **AXES, structure_frequency=fs, variables=["sliding_mode"]
+    )
 
 
 # ------------------------------------------------------------------------ what is computed
 
 
 def test_variables_are_returned_as_asked() -> None:
-    result = slipsweep.sweep(**AXES, variables=["limiting_acceleration", "validity", "permanent_displacement"])
-    assert tuple(result.data_vars) == ("permanent_displacement", "validity", "limiting_acceleration")
+    result = slipsweep.sweep(
+        **AXES, variables=["limiting_acceleration", "validity", "permanent_displacement"]
+    )
+    assert tuple(result.data_vars) == (
+        "permanent_displacement",
+        "validity",
+        "limiting_acceleration",
+    )
     # Eqs. 7-11 do not know of the frequency
     assert result.limiting_acceleration.dims == ("theta", "mu_s", "amplitude")
     found = slipsweep.friction_parameters(*(AXES[name] for name in ("theta", "mu_s", "amplitude")))
@@ -178,7 +209,9 @@ def test_variables_are_returned_as_asked() -> None:
     everything = slipsweep.sweep(**AXES)
     np.testing.assert_array_equal(result.validity, everything.validity)
     # without the peak velocity the kernel may sum in another order
-    np.testing.assert_allclose(result.permanent_displacement, everything.permanent_displacement, rtol=1e-13)
+    np.testing.assert_allclose(
+        result.permanent_displacement, everything.permanent_displacement, rtol=1e-13
+    )
 
 
 def test_what_is_given_is_a_coordinate_and_no_result() -> None:
@@ -196,7 +229,13 @@ def test_nothing_unasked_is_computed(cells_solved: list[int]) -> None:
 
 def test_progress_counts_every_cell_once() -> None:
     seen: list[int] = []
-    slipsweep.sweep(np.linspace(0, 15, 400), np.linspace(0.2, 0.9, 40), [1.0, 3.0], [1.0, 2.0], progress=seen.append)
+    slipsweep.sweep(
+        np.linspace(0, 15, 400),
+        np.linspace(0.2, 0.9, 40),
+        [1.0, 3.0],
+        [1.0, 2.0],
+        progress=seen.append,
+    )
     assert sum(seen) == 400 * 40 * 2 * 2
     assert len(seen) > 1
 
@@ -211,12 +250,18 @@ def test_progress_counts_every_cell_once() -> None:
     ],
 )
 def test_chunked_is_eager_to_the_bit(chunks: Any, scheduler: str) -> None:
-    options: dict[str, Any] = {**AXES, "structure_frequency": 4.0, "variables": [*DEFAULT_RESULTS, "decay_rate"]}
+    options: dict[str, Any] = {
+        **AXES,
+        "structure_frequency": 4.0,
+        "variables": [*DEFAULT_RESULTS, "decay_rate"],
+    }
     lazy = slipsweep.sweep(**options, chunks=chunks)
     assert all(hasattr(lazy[name].data, "dask") for name in lazy.data_vars)
     eager = slipsweep.sweep(**options)
     assert {name: lazy[name].dtype for name in lazy} == {name: eager[name].dtype for name in eager}
-    xr.testing.assert_identical(lazy.compute(scheduler=scheduler, num_workers=1 + (scheduler == "threads")), eager)
+    xr.testing.assert_identical(
+        lazy.compute(scheduler=scheduler, num_workers=1 + (scheduler == "threads")), eager
+    )
 
 
 def test_a_lazy_sweep_computes_nothing(cells_solved: list[int]) -> None:
@@ -238,13 +283,21 @@ def test_all_results_of_a_chunk_are_computed_once(cells_solved: list[int]) -> No
 
 
 def test_a_history_has_the_results_of_the_sweep() -> None:
-    block: dict[str, Any] = {**GOOD, "yield_acceleration": 0.59, "excitation": slipsweep.Sine(cycles=5)}
-    history, swept = slipsweep.simulate(**block), slipsweep.sweep(**block)
+    block: dict[str, Any] = {
+        **GOOD,
+        "yield_acceleration": 0.59,
+        "excitation": slipsweep.Sine(cycles=5),
+    }
+    history = slipsweep.simulate(**block)
+    swept = slipsweep.sweep(**block)
     assert history.relative_displacement.dims == ("time",)
     xr.testing.assert_identical(
-        history[list(DEFAULT_RESULTS)].drop_vars("time", errors="ignore"), swept.assign_attrs(history.attrs)
+        history[list(DEFAULT_RESULTS)].drop_vars("time", errors="ignore"),
+        swept.assign_attrs(history.attrs),
     )
-    assert history.relative_displacement[-1].item() == pytest.approx(swept.permanent_displacement.item(), rel=1e-13)
+    assert history.relative_displacement[-1].item() == pytest.approx(
+        swept.permanent_displacement.item(), rel=1e-13
+    )
 
 
 def test_attributes_tell_how_it_was_made() -> None:
@@ -252,18 +305,32 @@ def test_attributes_tell_how_it_was_made() -> None:
     assert attrs["title"] == "Permanent displacement of a rigid block, swept"
     assert attrs["source"] == f"slipsweep {__version__}"
     assert "10.1016/j.soildyn.2011.08.007" in attrs["references"]
-    chosen = {name: attrs[name] for name in ("g", "model", "waveform", "cycles", "rise", "recoupling", "solver")}
+    chosen = {
+        name: attrs[name]
+        for name in ("g", "model", "waveform", "cycles", "rise", "recoupling", "solver")
+    }
     assert chosen == {
-        "g": 9.81, "model": "mendez", "waveform": "sine", "cycles": 3, "rise": "monotone", "recoupling": "eq12",
+        "g": 9.81,
+        "model": "mendez",
+        "waveform": "sine",
+        "cycles": 3,
+        "rise": "monotone",
+        "recoupling": "eq12",
         "solver": "cycle",
-    }  # fmt: skip
+    }
     assert not {"rule", "steps_per_cycle"} & {*attrs}
     stepped = slipsweep.sweep(**GOOD, model="newmark", solver=slipsweep.Step(rule="simpson")).attrs
     assert (stepped["rule"], stepped["steps_per_cycle"]) == ("simpson", 1024)
     assert not {"rise", "recoupling"} & {*stepped}
     assert slipsweep.friction_parameters(5.0, 0.38, 3.0).attrs.keys() == {
-        "title", "source", "references", "model", "rise", "recoupling", "g"
-    }  # fmt: skip
+        "title",
+        "source",
+        "references",
+        "model",
+        "rise",
+        "recoupling",
+        "g",
+    }
 
 
 # ---------------------------------------------------------------------------------- errors
@@ -275,7 +342,10 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"mu_s": [0.3, math.inf]}, "mu_s = inf: must be a finite number > 0"),
     ({"amplitude": -0.5}, "amplitude = -0.5: must be a finite number >= 0"),
     ({"frequency": 0.0}, "frequency = 0: must be a finite number > 0"),
-    ({"amplitude": None, "displacement_amplitude": -1.0}, "displacement_amplitude = -1: must be a finite number >= 0"),
+    (
+        {"amplitude": None, "displacement_amplitude": -1.0},
+        "displacement_amplitude = -1: must be a finite number >= 0",
+    ),
     ({"yield_acceleration": math.nan}, "yield_acceleration = nan: must be a finite number"),
     ({"decay_rate": -1.0}, "decay_rate = -1: must be a finite number >= 0"),
     ({"delta_mu": -0.1}, "delta_mu = -0.1: must be a finite number >= 0"),
@@ -284,10 +354,16 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"g": 0.0}, "g = 0: must be a finite number > 0"),
     ({"g": [9.8, 9.81]}, "g = [9.8, 9.81]: must be a single number"),
     ({"theta": "steep"}, "theta = 'steep': must be a number, or an array of numbers"),
-    ({"theta": np.zeros((2, 2))}, "theta: an array of 2 dimensions; must be a scalar, a 1-D array, or a DataArray"),
+    (
+        {"theta": np.zeros((2, 2))},
+        "theta: an array of 2 dimensions; must be a scalar, a 1-D array, or a DataArray",
+    ),
     ({"theta": []}, "theta = []: must hold at least one value"),
     ({"amplitude": None}, "amplitude, displacement_amplitude: exactly one of them must be given"),
-    ({"displacement_amplitude": 0.1}, "amplitude, displacement_amplitude: exactly one of them must be given"),
+    (
+        {"displacement_amplitude": 0.1},
+        "amplitude, displacement_amplitude: exactly one of them must be given",
+    ),
     ({"frequency": None}, "frequency: must be given"),
     (
         {"amplitude": None, "displacement_amplitude": [1e30, 1.0], "frequency": [1.0, 9e4]},
@@ -302,17 +378,32 @@ BAD: list[tuple[dict[str, Any], str]] = [
         {"solver": "step", "steps_per_cycle": 40_000_000},
         "steps_per_cycle = 40000000: must be a whole number <= 16777216",
     ),
-    ({"model": "coulomb"}, "model = 'coulomb': must be one of 'mendez', 'newmark', or Mendez(...), Newmark(...)"),
+    (
+        {"model": "coulomb"},
+        "model = 'coulomb': must be one of 'mendez', 'newmark', or Mendez(...), Newmark(...)",
+    ),
     ({"rise": "slow"}, "rise = 'slow': must be one of 'monotone', 'literal'"),
     ({"recoupling": "eq13"}, "recoupling = 'eq13': must be one of 'eq12', 'integrate'"),
     ({"waveform": "saw"}, "excitation = 'saw': must be one of 'sine'"),
-    ({"solver": "fast"}, "solver = 'fast': must be one of 'auto', 'cycle', 'step', or Cycle(...), Step(...)"),
-    ({"solver": "step", "rule": "euler"}, "rule = 'euler': must be one of 'rectangle', 'trapezoid', 'simpson'"),
+    (
+        {"solver": "fast"},
+        "solver = 'fast': must be one of 'auto', 'cycle', 'step', or Cycle(...), Step(...)",
+    ),
+    (
+        {"solver": "step", "rule": "euler"},
+        "rule = 'euler': must be one of 'rectangle', 'trapezoid', 'simpson'",
+    ),
     ({"variables": "validity"}, "variables = 'validity': must be a list of names"),
-    ({"variables": ["displacement"]}, "variables = 'displacement': must be one of 'permanent_displacement', "),
+    (
+        {"variables": ["displacement"]},
+        "variables = 'displacement': must be one of 'permanent_displacement', ",
+    ),
     ({"variables": []}, "variables = []: must name one of 'permanent_displacement', "),
     (
-        {"theta": xr.DataArray([1.0, 2.0], dims="case"), "mu_s": xr.DataArray([0.3, 0.4, 0.5], dims="case")},
+        {
+            "theta": xr.DataArray([1.0, 2.0], dims="case"),
+            "mu_s": xr.DataArray([0.3, 0.4, 0.5], dims="case"),
+        },
         "mu_s: 3 values along 'case', where another parameter has 2",
     ),
     (
@@ -323,7 +414,10 @@ BAD: list[tuple[dict[str, Any], str]] = [
         "mu_s: its coordinate 'case' differs from that of another parameter",
     ),
     (
-        {"theta": [0.0, 10.0], "mu_s": xr.DataArray([0.3, 0.4], dims="theta", coords={"theta": [0.0, 5.0]})},
+        {
+            "theta": [0.0, 10.0],
+            "mu_s": xr.DataArray([0.3, 0.4], dims="theta", coords={"theta": [0.0, 5.0]}),
+        },
         "mu_s: its coordinate 'theta' differs from that of another parameter",
     ),
     ({"chunks": {"thet": 1}}, "chunks = {'thet': 1}: 'thet' is not a dimension; they are "),
@@ -333,7 +427,10 @@ BAD: list[tuple[dict[str, Any], str]] = [
 
 BAD_HISTORIES: list[tuple[dict[str, Any], str]] = [
     ({"theta": [1.0, 2.0]}, "theta: simulate takes one case; must be a single number"),
-    ({"mu_s": xr.DataArray([0.3], dims="case")}, "mu_s: simulate takes one case; must be a single number"),
+    (
+        {"mu_s": xr.DataArray([0.3], dims="case")},
+        "mu_s: simulate takes one case; must be a single number",
+    ),
     ({"theta": 95.0}, "theta = 95: must be 0 <= theta < 90 degrees"),
     ({"points_per_cycle": 3}, "points_per_cycle = 3: must be a whole number >= 4"),
     ({"points_per_cycle": 10**9, "cycles": 10**9}, "a history of 1e+18 points: takes "),
@@ -346,7 +443,10 @@ BAD_HISTORIES: list[tuple[dict[str, Any], str]] = [
 
 @pytest.mark.parametrize(
     ("call", "change", "message"),
-    [*((slipsweep.sweep, *bad) for bad in BAD), *((slipsweep.simulate, *bad) for bad in BAD_HISTORIES)],
+    [
+        *((slipsweep.sweep, *bad) for bad in BAD),
+        *((slipsweep.simulate, *bad) for bad in BAD_HISTORIES),
+    ],
 )
 def test_bad_input_is_named(call: Callable[..., Any], change: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError) as error:
@@ -368,7 +468,9 @@ def test_bad_friction_parameters_are_named() -> None:
         ({"g": 1.6}, r"give model=Mendez\(g=1.6\)"),
     ],
 )
-def test_an_option_in_the_wrong_place_is_told_where_it_goes(option: dict[str, Any], message: str) -> None:
+def test_an_option_in_the_wrong_place_is_told_where_it_goes(
+    option: dict[str, Any], message: str
+) -> None:
     with pytest.raises(TypeError, match=message):
         slipsweep.sweep(5, 0.4, 3.0, 2.0, **option)
 
@@ -400,7 +502,9 @@ def test_unknown_arguments_are_errors() -> None:
 
 def test_a_grid_too_large_for_memory_is_refused() -> None:
     axis = np.linspace(0.1, 10.0, 3000)
-    with pytest.raises(InputError, match=r"grid of 3000 theta x .* x 3000 frequency, 8\.1e\+13 cells: takes .* TB"):
+    with pytest.raises(
+        InputError, match=r"grid of 3000 theta x .* x 3000 frequency, 8\.1e\+13 cells: takes .* TB"
+    ):
         slipsweep.sweep(axis, axis, axis, axis)
 
 
@@ -441,6 +545,11 @@ AXES_OF = (
 )
 def test_peak_memory_is_that_of_the_result(call: str) -> None:
     """At most 1.2 times its bytes, beyond what a small sweep takes."""
-    done = subprocess.run([sys.executable, "-c", MEMORY.format(call=call)], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", MEMORY.format(call=call)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     assert float(done.stdout) < 1.2

@@ -36,7 +36,11 @@ def expected() -> np.ndarray:
 
 def count_in_process(code: str = "", **environment: str) -> int:
     """Threads that a fresh process would use, after some code."""
-    clean = {name: value for name, value in os.environ.items() if name not in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS")}
+    clean = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS")
+    }
     code += "\nfrom slipsweep.grid.threads import thread_count; print(thread_count())"
     return int(subprocess.check_output([sys.executable, "-c", code], env=clean | environment))
 
@@ -56,9 +60,14 @@ def test_environment_limits_threads(name: str) -> None:
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="no affinity here")
 def test_affinity_limits_threads() -> None:
-    assert count_in_process(code="import os; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})") == 1
+    assert (
+        count_in_process(code="import os; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})")
+        == 1
+    )
     # even where it changes later
-    late = "import os, slipsweep.grid.threads; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})"
+    late = (
+        "import os, slipsweep.grid.threads; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})"
+    )
     assert count_in_process(code=late) == 1
 
 
@@ -73,17 +82,25 @@ def test_threads_of_others_compute_on_themselves(expected: np.ndarray) -> None:
 
 
 def test_dasks_threads(expected: np.ndarray) -> None:
-    lazy = slipsweep.sweep(**GRID, variables=["permanent_displacement"], chunks={"theta": 7, "mu_s": 13})
-    np.testing.assert_array_equal(lazy.permanent_displacement.data.compute(scheduler="threads"), expected)
+    lazy = slipsweep.sweep(
+        **GRID, variables=["permanent_displacement"], chunks={"theta": 7, "mu_s": 13}
+    )
+    np.testing.assert_array_equal(
+        lazy.permanent_displacement.data.compute(scheduler="threads"), expected
+    )
 
 
-@pytest.mark.parametrize("method", [m for m in ("fork", "spawn") if m in multiprocessing.get_all_start_methods()])
+@pytest.mark.parametrize(
+    "method", [m for m in ("fork", "spawn") if m in multiprocessing.get_all_start_methods()]
+)
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 def test_processes(method: str, expected: np.ndarray) -> None:
     """Forked after a sweep, too: no thread is left that a child could miss; and kernels that are loaded give the bits
     of those that were compiled here."""
     # a process that is not forked takes two seconds to start
-    with ProcessPoolExecutor(2 if method == "fork" else 1, multiprocessing.get_context(method)) as pool:
+    with ProcessPoolExecutor(
+        2 if method == "fork" else 1, multiprocessing.get_context(method)
+    ) as pool:
         both = {waveform: pool.submit(displacement, waveform) for waveform in ("sine", "cosine")}
         np.testing.assert_array_equal(both["sine"].result(timeout=120), expected)
         np.testing.assert_array_equal(both["cosine"].result(timeout=120), displacement("cosine"))
@@ -118,7 +135,9 @@ for sweep in ({", ".join(f"lambda: slipsweep.sweep({arguments})" for arguments i
 def test_an_interrupt_is_heard_at_once(limit: str) -> None:
     streams: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     environment = {**os.environ, "OMP_NUM_THREADS": limit}
-    with subprocess.Popen([sys.executable, "-c", INTERRUPTED], env=environment, **streams) as process:
+    with subprocess.Popen(
+        [sys.executable, "-c", INTERRUPTED], env=environment, **streams
+    ) as process:
         assert process.stdout is not None
         stop = threading.Timer(120, process.kill)
         stop.start()
@@ -130,7 +149,8 @@ def test_an_interrupt_is_heard_at_once(limit: str) -> None:
                 process.send_signal(signal.SIGINT)
                 sent = time.monotonic()
                 assert process.stdout.readline() == "interrupted\n", kind
-                # generous: a call of a kernel takes a tenth of a second at most, on a machine that others use, too
+                # generous: a call of a kernel takes a tenth of a second at most, on a machine that
+                # others use, too
                 assert time.monotonic() - sent < 20.0, kind
             assert process.communicate(timeout=60) == ("", "")
         finally:

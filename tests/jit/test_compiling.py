@@ -48,7 +48,9 @@ print(round(float(found.limiting_acceleration), 3))
 def environment(tmp_path: Path, **others: str) -> dict[str, str]:
     (tmp_path / "ofown.py").write_text(MODULE)
     own = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
-    return own | {"XDG_CACHE_HOME": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1"} | others
+    return (
+        own | {"XDG_CACHE_HOME": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1"} | others
+    )
 
 
 def run(code: str, env: dict[str, str], *arguments: str) -> str:
@@ -59,10 +61,14 @@ def run(code: str, env: dict[str, str], *arguments: str) -> str:
     return done.stdout.strip()
 
 
-def test_of_eight_processes_that_start_at_once_one_compiles_also_where_two_are_killed(tmp_path: Path) -> None:
+def test_of_eight_processes_that_start_at_once_one_compiles_also_where_two_are_killed(
+    tmp_path: Path,
+) -> None:
     env = environment(tmp_path)
     command = [sys.executable, "-c", ONE, str(tmp_path)]
-    running = [subprocess.Popen(command, env=env, stdout=subprocess.PIPE, text=True) for _ in range(8)]
+    running = [
+        subprocess.Popen(command, env=env, stdout=subprocess.PIPE, text=True) for _ in range(8)
+    ]
     while not (tmp_path / "cache").exists() and running[0].poll() is None:
         time.sleep(0.01)
     for one in running[:2]:
@@ -80,7 +86,9 @@ def test_a_changed_equation_is_never_served_from_an_old_cache(tmp_path: Path) ->
     env = environment(tmp_path, PYTHONPATH=str(copy))
     assert run(PARAMETERS, env) == "4.431"
     equations = copy / "slipsweep" / "model" / "equations.py"
-    before, formula, after = equations.read_text("utf-8").partition("return (yield_acceleration + g * mu_s) /")
+    before, formula, after = equations.read_text("utf-8").partition(
+        "return (yield_acceleration + g * mu_s) /"
+    )
     assert formula
     equations.write_text(before + formula.replace("+", "-") + after, "utf-8")
     assert run(PARAMETERS, env) == "-3.22"

@@ -43,7 +43,9 @@ def worst(found: Array, function: Callable[..., Any], *arguments: Array) -> floa
     """Largest error, in units in the last place of the true values."""
     errors = []
     with mpmath.workdps(400):
-        for value, *given in zip(found.tolist(), *(argument.tolist() for argument in arguments), strict=True):
+        for value, *given in zip(
+            found.tolist(), *(argument.tolist() for argument in arguments), strict=True
+        ):
             true = function(*map(mpmath.mpf, given))
             errors.append(float(abs(value - true)) / math.ulp(float(true)))
     return max(errors)
@@ -58,13 +60,22 @@ def spread(low: float, high: float, smallest: float = 1e-300) -> Array:
     return np.concatenate([random.uniform(low, high, 2000), both, ends])
 
 
-#: Its like in mpmath, places to try, and the largest error allowed: half a unit or more above what was seen.
+#: Its like in mpmath, places to try, and the largest error allowed: half a unit or more above what
+#: was seen.
 FUNCTIONS: dict[str, tuple[Callable[[Any], Any], Array, float]] = {
     "exp": (mpmath.exp, spread(-708.0, 709.0), 1.5),
-    "log": (mpmath.log, np.concatenate([spread(1e-300, 1.7e308, 2.3e-308), 1.0 + spread(-0.5, 1.0, 1e-15)]), 2.5),
+    "log": (
+        mpmath.log,
+        np.concatenate([spread(1e-300, 1.7e308, 2.3e-308), 1.0 + spread(-0.5, 1.0, 1e-15)]),
+        2.5,
+    ),
     "versine": (lambda x: 1 - mpmath.cos(x), spread(-HALF_PI, HALF_PI, 1e-150), 2.0),
     "angle_minus_sine": (lambda x: x - mpmath.sin(x), spread(-HALF_PI, HALF_PI, 1e-100), 3.5),
-    "half_square_minus_versine": (lambda x: x**2 / 2 - 1 + mpmath.cos(x), spread(-HALF_PI, HALF_PI, 1e-75), 4.0),
+    "half_square_minus_versine": (
+        lambda x: x**2 / 2 - 1 + mpmath.cos(x),
+        spread(-HALF_PI, HALF_PI, 1e-75),
+        4.0,
+    ),
     "inverse_versine": (lambda q: 2 * mpmath.asin(mpmath.sqrt(q / 2)), spread(0.0, 1.0), 2.5),
 }
 
@@ -91,7 +102,12 @@ def test_beyond_their_ranges() -> None:
     ends = over(elementary.log, np.array([-math.inf, -1.0, 0.0, 1.0, math.inf]))
     assert np.isnan(ends[:2]).all()
     assert ends[2:].tolist() == [-math.inf, 0.0, math.inf]
-    assert over(elementary.inverse_versine, np.array([-0.1, 0.0, 1.0, 1.1])).tolist() == [0.0, 0.0, HALF_PI, HALF_PI]
+    assert over(elementary.inverse_versine, np.array([-0.1, 0.0, 1.0, 1.1])).tolist() == [
+        0.0,
+        0.0,
+        HALF_PI,
+        HALF_PI,
+    ]
 
 
 @pytest.mark.parametrize("name", APPROXIMATIONS)

@@ -25,7 +25,9 @@ def assert_solved(cases: list[Case], validities: dict[int, int], **solver: Any) 
     found = solve(cases, **solver)
     for case in cases:
         mode, validity = found[case.case][2:]
-        assert (mode, Validity(validity)) == (case.sliding_mode, Validity(validities[case.case])), f"case {case}"
+        assert (mode, Validity(validity)) == (case.sliding_mode, Validity(validities[case.case])), (
+            f"case {case}"
+        )
         assert mode < 0 or not (wrong := case.missed(found[case.case], 1e-11)), wrong
 
 
@@ -42,8 +44,13 @@ def test_every_case_of_every_waveform() -> None:
 
 def test_just_above_yield_keeps_its_digits() -> None:
     """Relative to u itself: an ulp of A moves it by 3 ulp / excess at most."""
-    cases = [case for case in WAVE_CASES if case.category == "just_above_yield" and case.sliding_mode == 1]
-    found, moved = solve(cases), 0
+    cases = [
+        case
+        for case in WAVE_CASES
+        if case.category == "just_above_yield" and case.sliding_mode == 1
+    ]
+    found = solve(cases)
+    moved = 0
     for case in cases:
         right = float(case.permanent_displacement)
         assert case.yield_acceleration is not None
@@ -51,11 +58,14 @@ def test_just_above_yield_keeps_its_digits() -> None:
         if right > 1e-4 * excess**3 * case.displacement_scale:
             moved += 1
             error = abs(found[case.case][0] / right - 1)
-            assert error <= 100 * 3 * np.finfo(float).eps / excess, f"{case}: {error:.1e} at excess {excess:.1e}"
+            assert error <= 100 * 3 * np.finfo(float).eps / excess, (
+                f"{case}: {error:.1e} at excess {excess:.1e}"
+            )
     assert moved > 10
 
 
-# ------------------------------------------------------------------------- hard cases (docs/hard-cases.md)
+# ------------------------------------------------------------------------- hard cases
+# (docs/hard-cases.md)
 
 
 @pytest.mark.parametrize("category", CATEGORIES, ids=lambda category: category.__name__)
@@ -78,7 +88,8 @@ def test_hard_cases_within_100_times_their_conditioning() -> None:
             assert max(case.times_bounds(found[case.case])) <= 100, f"case {case}"
 
 
-# ----------------------------------------------------------------------------------------- random cells
+# ----------------------------------------------------------------------------------------- random
+# cells
 
 REGIMES = {
     "stuck": strategies.stuck(),
@@ -89,18 +100,25 @@ REGIMES = {
 }
 
 
-def assert_is_reference(cell: strategies.Cell, relative: float, absolute: float = 1e-12) -> reference.Solution:
+def assert_is_reference(
+    cell: strategies.Cell, relative: float, absolute: float = 1e-12
+) -> reference.Solution:
     """The cycle solver's answer, its parts that cancel to `absolute` of A/omega^2."""
     expected = reference.solve(**cell, dps=20)
     found = slipsweep.sweep(**choices(**cell, solver="cycle"))
     assert int(found.sliding_mode) == expected.sliding_mode, "sliding mode"
     assert Validity(int(found.validity)) == Validity(expected.validity), "validity"
     second = strategies.phase_scale(cell)
-    for name, scale in zip(MOTION, (cell["amplitude"] * second**2, cell["amplitude"] * second), strict=True):
-        value, right = float(found[name]), float(getattr(expected, name))
+    for name, scale in zip(
+        MOTION, (cell["amplitude"] * second**2, cell["amplitude"] * second), strict=True
+    ):
+        value = float(found[name])
+        right = float(getattr(expected, name))
         assert isnan(value) == bool(expected.validity & VALUELESS), name
         if not isnan(value):
-            assert abs(value - right) <= relative * abs(right) + absolute * scale, f"{name} {value!r}, not {right!r}"
+            assert abs(value - right) <= relative * abs(right) + absolute * scale, (
+                f"{name} {value!r}, not {right!r}"
+            )
     return expected
 
 
@@ -122,23 +140,39 @@ def test_many_cycles(cell: strategies.Cell, cycles: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("theta", "mu_s", "amplitude", "cycles"), [(10.15, 0.2, 1.223, 4), (10.15, 0.2, 1.223, 6), (13.22, 0.257, 1.822, 7)]
+    ("theta", "mu_s", "amplitude", "cycles"),
+    [(10.15, 0.2, 1.223, 4), (10.15, 0.2, 1.223, 6), (13.22, 0.257, 1.822, 7)],
 )
 def test_pulses_that_lose_speed(theta: float, mu_s: float, amplitude: float, cycles: int) -> None:
     """At rest the block sticks beyond Üg = Üy; carried on, it slides through ever more slowly, every third or
     fourth pulse begins again, and W of the cycles repeats."""
-    cell: strategies.Cell = {"theta": theta, "mu_s": mu_s, "amplitude": amplitude, "frequency": 1.0, "cycles": cycles}
+    cell: strategies.Cell = {
+        "theta": theta,
+        "mu_s": mu_s,
+        "amplitude": amplitude,
+        "frequency": 1.0,
+        "cycles": cycles,
+    }
     assert not assert_is_reference(cell, 1e-13, 0.0).recoupled
 
 
 @pytest.mark.parametrize(
     ("theta", "mu_s", "amplitude"),
-    [(10.51, 0.2, 0.661), (11.53, 0.214, 1.057), (13.2, 0.243, 1.114), (16.6, 0.3, 1.625), (19.7, 0.371, 2.305)],
+    [
+        (10.51, 0.2, 0.661),
+        (11.53, 0.214, 1.057),
+        (13.2, 0.243, 1.114),
+        (16.6, 0.3, 1.625),
+        (19.7, 0.371, 2.305),
+    ],
 )
 def test_pulses_that_stop_anew(theta: float, mu_s: float, amplitude: float) -> None:
     """Carried on, the block stops between t1 and Üg = b and restarts at once, elsewhere in every pulse."""
     cell: strategies.Cell = {"theta": theta, "mu_s": mu_s, "amplitude": amplitude, "frequency": 1.0}
-    grown = [assert_is_reference({**cell, "cycles": n}, 1e-12, 0.0).permanent_displacement for n in range(1, 9)]
+    grown = [
+        assert_is_reference({**cell, "cycles": n}, 1e-12, 0.0).permanent_displacement
+        for n in range(1, 9)
+    ]
     assert np.ptp(np.diff([float(u) for u in grown])) > 0.1 * grown[0], "cycles are alike"
 
 
@@ -150,7 +184,9 @@ def test_pulses_that_stop_anew_as_event_by_event(excitation: Any) -> None:
     swept = slipsweep.sweep(**block, amplitude=amplitude, excitation=excitation)
     assert (swept.validity.values & Validity.NOT_RECOUPLED).any()
     for value, u in zip(amplitude, swept.permanent_displacement.values.ravel(), strict=True):
-        history = slipsweep.simulate(**block, amplitude=value, excitation=excitation, times=[0.0, 1e4])
+        history = slipsweep.simulate(
+            **block, amplitude=value, excitation=excitation, times=[0.0, 1e4]
+        )
         assert abs(u / float(history.relative_displacement[-1]) - 1) <= 1e-11
 
 
@@ -158,19 +194,34 @@ def test_pulses_that_stop_anew_as_event_by_event(excitation: Any) -> None:
 @pytest.mark.parametrize("delta_mu", [0.0, 0.02, 0.3, 6.0])
 def test_peaks_of_continuous_sliding(delta_mu: float, cycles: int) -> None:
     """Whether the velocity turns on both half cycles, on one or on none; from friction that hardly falls to e^-7."""
-    theta, mu_s, amplitude = 3.0, 0.3, 1.9 * strategies.G
-    decay_rate = np.array([0.02, 0.1, 0.15, 0.3, 0.8, 2.0, 3.1, 3.5, 4.5, 5.5, 7.0]) * strategies.G / amplitude
-    cell: strategies.Cell = {"theta": theta, "mu_s": mu_s, "amplitude": amplitude, "delta_mu": delta_mu}
+    theta = 3.0
+    mu_s = 0.3
+    amplitude = 1.9 * strategies.G
+    decay_rate = (
+        np.array([0.02, 0.1, 0.15, 0.3, 0.8, 2.0, 3.1, 3.5, 4.5, 5.5, 7.0])
+        * strategies.G
+        / amplitude
+    )
+    cell: strategies.Cell = {
+        "theta": theta,
+        "mu_s": mu_s,
+        "amplitude": amplitude,
+        "delta_mu": delta_mu,
+    }
     cell |= {"frequency": 1.0, "cycles": cycles}
     swept = slipsweep.sweep(**choices(**cell, decay_rate=decay_rate))
     assert (swept.sliding_mode == 2).all()
     for rate, velocity in zip(decay_rate, swept.peak_relative_velocity.values.ravel(), strict=True):
         right = float(reference.solve(**cell, decay_rate=rate).peak_relative_velocity)
-        assert abs(velocity - right) <= 1e-13 * (abs(right) + cycles * amplitude / (2 * pi)), f"lambda {rate}"
+        assert abs(velocity - right) <= 1e-13 * (abs(right) + cycles * amplitude / (2 * pi)), (
+            f"lambda {rate}"
+        )
 
 
 @strategies.reproducible
-@given(cell=strategies.given_friction(), exponent=st.floats(0.0, 6.0), options=strategies.model_options)
+@given(
+    cell=strategies.given_friction(), exponent=st.floats(0.0, 6.0), options=strategies.model_options
+)
 def test_sharp_decay(cell: strategies.Cell, exponent: float, options: dict[str, str]) -> None:
     """lambda A / g up to 1e6: friction gone in a layer of 1e-6 of phase."""
     rate = 10**exponent * strategies.G / cell["amplitude"]
@@ -192,6 +243,8 @@ def test_just_above_yield(cell: strategies.Cell, exponent: float) -> None:
     conditioning = 2 * np.finfo(float).eps / excess
     scale = amplitude * strategies.phase_scale(cell) ** 2
     if right > 1e-3 * excess**2 * scale:  # elsewhere the block sticks until past yield
-        assert abs(float(result.permanent_displacement) / right - 1) <= 100 * conditioning, f"excess {excess:.1e}"
+        assert abs(float(result.permanent_displacement) / right - 1) <= 100 * conditioning, (
+            f"excess {excess:.1e}"
+        )
     else:
         assert abs(float(result.permanent_displacement) - right) <= 1e-12 * scale

@@ -32,18 +32,24 @@ def integrated(wave: str, r: float) -> float:
     def stops(_: float, state: np.ndarray) -> float:
         return float(state[0])
 
-    stops.terminal, stops.direction = True, -1.0  # type: ignore[attr-defined]
+    # type: ignore[attr-defined]
+    stops.terminal = True
+    stops.direction = -1.0
     state = np.array([0.0, 0.0])
     for start, end in itertools.pairwise(ends):
         if end <= onset:
             continue
         inside = 1e-12 * (end - start)  # of the part itself, where the wave jumps
 
-        def rate(s: float, state: np.ndarray, low: float = start + inside, high: float = end - inside) -> list[float]:
+        def rate(
+            s: float, state: np.ndarray, low: float = start + inside, high: float = end - inside
+        ) -> list[float]:
             return [float(w(np.clip(s, low, high))) - r, state[0]]
 
         span = (max(start, onset), end)
-        part = solve_ivp(rate, span, state, method="DOP853", rtol=1e-12, atol=1e-15, max_step=0.01, events=stops)
+        part = solve_ivp(
+            rate, span, state, method="DOP853", rtol=1e-12, atol=1e-15, max_step=0.01, events=stops
+        )
         state = part.y[:, -1]
         if part.status == 1:
             break
@@ -53,7 +59,9 @@ def integrated(wave: str, r: float) -> float:
 @pytest.mark.parametrize("wave", WAVES)
 @pytest.mark.parametrize("r", RATIOS)
 def test_closed_forms_are_what_scipy_integrates(wave: str, r: float) -> None:
-    assert float(getattr(closed_forms, wave)(mpf(r))) == pytest.approx(integrated(wave, r), rel=1e-8)
+    assert float(getattr(closed_forms, wave)(mpf(r))) == pytest.approx(
+        integrated(wave, r), rel=1e-8
+    )
 
 
 @pytest.mark.parametrize("cycles", [1, 7])
@@ -62,20 +70,28 @@ def test_closed_forms_are_what_scipy_integrates(wave: str, r: float) -> None:
 def test_solvers_give_the_closed_forms(wave: str, cycles: int, solver: Any, rel: float) -> None:
     """Every cycle adds the same, as each slide ends within it."""
     found = slipsweep.sweep(
-        yield_coefficient=np.array(RATIOS), amplitude=G, frequency=2.0, model=Newmark(g=G), solver=solver,
-        excitation=OBJECTS[wave](cycles), variables=["permanent_displacement"],
-    )  # fmt: skip
+        yield_coefficient=np.array(RATIOS),
+        amplitude=G,
+        frequency=2.0,
+        model=Newmark(g=G),
+        solver=solver,
+        excitation=OBJECTS[wave](cycles),
+        variables=["permanent_displacement"],
+    )
     expected = [cycles * G / 4.0 * float(getattr(closed_forms, wave)(mpf(r))) for r in RATIOS]
     np.testing.assert_allclose(found.permanent_displacement, expected, rtol=rel)
 
 
 def test_a_rectangular_pulse() -> None:
     """A record of constant acceleration, V²/2N (1 − N/A)."""
-    amplitude, duration = 4.0, 0.3
+    amplitude = 4.0
+    duration = 0.3
     record = Record(np.array([0.0, duration]), np.array([amplitude, amplitude]))
     found = slipsweep.sweep(
-        yield_coefficient=np.array(RATIOS) * amplitude / G, excitation=record, model=Newmark(g=G),
+        yield_coefficient=np.array(RATIOS) * amplitude / G,
+        excitation=record,
+        model=Newmark(g=G),
         variables=["permanent_displacement"],
-    )  # fmt: skip
+    )
     expected = [amplitude * duration**2 * float(closed_forms.rectangle(mpf(r))) for r in RATIOS]
     np.testing.assert_allclose(found.permanent_displacement, expected, rtol=1e-12)

@@ -51,13 +51,20 @@ def failing(*arguments: Any) -> None:
     results[solvers.ROWS["validity"], 4:5] = UNSOLVED
 
 
-@pytest.mark.parametrize("options", [{"excitation": slipsweep.Triangle(ramp_in=1)}, {"solver": "step"}])
+@pytest.mark.parametrize(
+    "options", [{"excitation": slipsweep.Triangle(ramp_in=1)}, {"solver": "step"}]
+)
 def test_a_cell_that_is_not_solved_ends_the_run_and_is_named(
     options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(solvers, "solve_waves", failing)
     monkeypatch.setattr(solvers, "solve_steps", failing)
-    axes: dict[str, Any] = {"theta": [0.0, 5.0], "mu_s": 0.3, "amplitude": [2.0, 3.0, 4.5], "frequency": [1.0, 2.0]}
+    axes: dict[str, Any] = {
+        "theta": [0.0, 5.0],
+        "mu_s": 0.3,
+        "amplitude": [2.0, 3.0, 4.5],
+        "frequency": [1.0, 2.0],
+    }
     named = r"theta = 5, mu_s = 0.3, amplitude = 3, frequency = 1, g = 9.81: an event"
     with pytest.raises(RunError, match=named) as error:
         slipsweep.sweep(**axes, **options)
@@ -67,6 +74,13 @@ def test_a_cell_that_is_not_solved_ends_the_run_and_is_named(
 def test_a_cell_of_a_record_that_is_not_solved_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(solvers, "solve_record", failing)
     record = slipsweep.Record.sampled([0.0, 3.0, -3.0, 0.0], 0.1)
-    axes: dict[str, Any] = {"theta": [0.0, 5.0], "mu_s": 0.3, "scale": [1.0, 2.0, 3.0], "polarity": -1}
-    with pytest.raises(RunError, match=r"theta = 5, mu_s = 0.3, scale = 2, .*polarity = -1, g = 9.81: an event"):
+    axes: dict[str, Any] = {
+        "theta": [0.0, 5.0],
+        "mu_s": 0.3,
+        "scale": [1.0, 2.0, 3.0],
+        "polarity": -1,
+    }
+    with pytest.raises(
+        RunError, match=r"theta = 5, mu_s = 0.3, scale = 2, .*polarity = -1, g = 9.81: an event"
+    ):
         slipsweep.sweep(excitation=record, **axes)

@@ -31,7 +31,9 @@ def wide(rng: random.Random, exponent: float = 30.0) -> float:
 def extreme(rng: random.Random, name: str) -> float:
     """A number within the bounds of a parameter, near their ends or anywhere between."""
     if name == "theta":
-        return rng.choice([0.0, 1e-300, 1e-10, 89.9999, math.nextafter(90.0, 0.0), rng.uniform(0.0, 90.0)])
+        return rng.choice(
+            [0.0, 1e-300, 1e-10, 89.9999, math.nextafter(90.0, 0.0), rng.uniform(0.0, 90.0)]
+        )
     if name in ("amplitude", "decay_rate", "delta_mu") and rng.random() < 0.2:
         return 0.0
     if name == "yield_acceleration":
@@ -61,7 +63,9 @@ def cell_of(rng: random.Random) -> dict[str, Any]:
     names = ["theta", "mu_s", "amplitude", "frequency"]
     optional = ("yield_acceleration", "decay_rate", "delta_mu", "minimum_friction")
     names += [name for name in optional if rng.random() < 0.3]
-    drawn = {name: common(rng, name, g) if rng.random() < 0.5 else extreme(rng, name) for name in names}
+    drawn = {
+        name: common(rng, name, g) if rng.random() < 0.5 else extreme(rng, name) for name in names
+    }
     return drawn | {"g": g}
 
 
@@ -91,12 +95,19 @@ def options_of(rng: random.Random) -> dict[str, Any]:
     options: dict[str, Any] = {"cycles": rng.choice([2, 10, 10**6]), **rng.choice(WAVES)}
     if rng.random() < 0.25:
         return options | {"model": "newmark"}
-    return options | {"rise": rng.choice(["monotone", "literal"]), "recoupling": rng.choice(["eq12", "integrate"])}
+    return options | {
+        "rise": rng.choice(["monotone", "literal"]),
+        "recoupling": rng.choice(["eq12", "integrate"]),
+    }
 
 
 def sweep(rng: random.Random, cell: dict[str, Any]) -> xr.Dataset:
     options = options_of(rng)
-    solver = {"solver": "step", "rule": rng.choice(["rectangle", "trapezoid", "simpson"]), "steps_per_cycle": 64}
+    solver = {
+        "solver": "step",
+        "rule": rng.choice(["rectangle", "trapezoid", "simpson"]),
+        "steps_per_cycle": 64,
+    }
     return slipsweep.sweep(**choices(**cell | options | rng.choice([solver, {"solver": "cycle"}])))
 
 
@@ -117,23 +128,32 @@ def record(rng: random.Random, cell: dict[str, Any]) -> xr.Dataset:
     values = np.array([0.0, 1.0, -0.7, 0.4, 0.9, -1.0, 0.0])
     peak = max(cell["amplitude"], 1e-30)
     times = np.arange(values.size) / max(cell["frequency"], 1e-29)
-    options: dict[str, Any] = {"rise": rng.choice(["monotone", "literal"]), "scale": rng.choice([1.0, wide(rng)])}
+    options: dict[str, Any] = {
+        "rise": rng.choice(["monotone", "literal"]),
+        "scale": rng.choice([1.0, wide(rng)]),
+    }
     motion = slipsweep.Record(times, peak * values)
-    return slipsweep.sweep(**choices(**own, **options, excitation=motion, time_scale=rng.choice([1.0, wide(rng)])))
+    return slipsweep.sweep(
+        **choices(**own, **options, excitation=motion, time_scale=rng.choice([1.0, wide(rng)]))
+    )
 
 
 def limit(rng: random.Random, cell: dict[str, Any]) -> xr.Dataset:
     own: dict[str, Any] = {name: value for name, value in cell.items() if name != "amplitude"}
     highest = {"maximum_amplitude": cell["amplitude"]} if cell["amplitude"] > 0.0 else {}
     given = without(choices(**own), "solver")
-    found = slipsweep.limit_amplitude(rng.choice([1e-30, 0.1, 1e30]), **given, **highest, amplitude_steps=16)
+    found = slipsweep.limit_amplitude(
+        rng.choice([1e-30, 0.1, 1e30]), **given, **highest, amplitude_steps=16
+    )
     assert not np.isinf(found.limit_amplitude)
     return found[["validity"]]
 
 
 def sample(rng: random.Random, cell: dict[str, Any]) -> xr.Dataset:
     drawn = {"mu_s": {"distribution": "uniform", "loc": 0.9, "scale": 0.2, "kind": "factor"}}
-    found = slipsweep.sample(**choices(**cell), uncertain=drawn, samples=16, thresholds=[rng.choice([0.0, 0.1, 1e30])])
+    found = slipsweep.sample(
+        **choices(**cell), uncertain=drawn, samples=16, thresholds=[rng.choice([0.0, 0.1, 1e30])]
+    )
     for name in ("displacement_quantile", "mean_displacement", "exceedance_probability"):
         assert not np.isinf(found[name]).any(), name
         assert bool((found.valueless_share == 1.0) | np.isfinite(found[name]).all()), name
@@ -162,9 +182,13 @@ def test_served_or_refused_by_name(way: str) -> None:
             found = solve(rng, cell)
         except InputError as error:
             message = str(error)
-            named = [name for name in (*cell, "maximum_amplitude", "of the record") if name in message]
+            named = [
+                name for name in (*cell, "maximum_amplitude", "of the record") if name in message
+            ]
             assert named, f"seed {seed}: {message}"
-            assert re.search("must be|are not a finite|too many cycles", message), f"seed {seed}: {message}"
+            assert re.search("must be|are not a finite|too many cycles", message), (
+                f"seed {seed}: {message}"
+            )
             continue
         served += 1
         if "validity" in found:
@@ -175,9 +199,18 @@ def test_served_or_refused_by_name(way: str) -> None:
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"amplitude": 1.7e308}, "amplitude = 1.7e+308: must be a finite number >= 0 and at most 1e+30"),
-        ({"frequency": 1e-160}, "frequency = 1e-160: must be a finite number > 0, from 1e-30 to 1e+30"),
-        ({"yield_acceleration": -1e31}, "yield_acceleration = -1e+31: must be a finite number from -1e+30 to 1e+30"),
+        (
+            {"amplitude": 1.7e308},
+            "amplitude = 1.7e+308: must be a finite number >= 0 and at most 1e+30",
+        ),
+        (
+            {"frequency": 1e-160},
+            "frequency = 1e-160: must be a finite number > 0, from 1e-30 to 1e+30",
+        ),
+        (
+            {"yield_acceleration": -1e31},
+            "yield_acceleration = -1e+31: must be a finite number from -1e+30 to 1e+30",
+        ),
         (
             {"amplitude": None, "displacement_amplitude": [0.1, 1e20], "frequency": [1.0, 1e8]},
             "displacement_amplitude = 1e+20: with frequency = 1e+08, A = (2 pi f)^2 d = ",
@@ -190,14 +223,22 @@ def test_served_or_refused_by_name(way: str) -> None:
 )
 @pytest.mark.parametrize("solver", ["cycle", "step"])
 def test_refusals_name_what_is_too_much(given: dict[str, Any], message: str, solver: str) -> None:
-    block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.38, "amplitude": 3.0, "frequency": 1.0, "solver": solver}
+    block: dict[str, Any] = {
+        "theta": 5.0,
+        "mu_s": 0.38,
+        "amplitude": 3.0,
+        "frequency": 1.0,
+        "solver": solver,
+    }
     with pytest.raises(InputError, match=re.escape(message)):
         slipsweep.sweep(**choices(**block | given))
 
 
 @pytest.mark.parametrize("recoupling", ["eq12", "integrate"])
 @pytest.mark.parametrize("rise", ["monotone", "literal"])
-@pytest.mark.parametrize("wave", [*WAVES, {"waveform": "triangle"}, {"waveform": "sine", "ramp_out": 1.0}], ids=str)
+@pytest.mark.parametrize(
+    "wave", [*WAVES, {"waveform": "triangle"}, {"waveform": "sine", "ramp_out": 1.0}], ids=str
+)
 def test_size_changes_nothing(wave: dict[str, Any], rise: str, recoupling: str) -> None:
     """All accelerations and g 1e±25 times as large: so is u, under a wave and a record."""
     shape = np.array([0.0, 4.2, -4.2, 4.2, 0.0])
@@ -206,7 +247,9 @@ def test_size_changes_nothing(wave: dict[str, Any], rise: str, recoupling: str) 
         block = {"theta": 4.0, "mu_s": 0.6, "rise": rise, "recoupling": recoupling}
         block |= {"yield_acceleration": 0.9 * size, "g": 9.81 * size}
         waved = {**wave, "amplitude": 4.2 * size, "frequency": 1.0, "cycles": 4, "solver": "cycle"}
-        recorded = {"excitation": slipsweep.Record(np.array([0.0, 0.25, 0.75, 1.25, 1.5]), shape * size)}
+        recorded = {
+            "excitation": slipsweep.Record(np.array([0.0, 0.25, 0.75, 1.25, 1.5]), shape * size)
+        }
         found = (slipsweep.sweep(**choices(**block, **motion)) for motion in (waved, recorded))
         return [float(one.permanent_displacement) / size for one in found]
 

@@ -27,14 +27,26 @@ def test_near_the_mode_limit_begins_and_ends_at_the_number(
     assume(onset > 0 and limit > 0 and border * limit * math.tan(math.radians(theta)) <= 9.0)
     amplitudes = [border * limit]
     for _ in range(4):
-        amplitudes = [math.nextafter(amplitudes[0], 0.0), *amplitudes, math.nextafter(amplitudes[-1], math.inf)]
+        amplitudes = [
+            math.nextafter(amplitudes[0], 0.0),
+            *amplitudes,
+            math.nextafter(amplitudes[-1], math.inf),
+        ]
     found = slipsweep.sweep(
-        theta, mu_s, amplitudes, 1.0, yield_acceleration=onset, solver=solver, decay_rate=3.0,
+        theta,
+        mu_s,
+        amplitudes,
+        1.0,
+        yield_acceleration=onset,
+        solver=solver,
+        decay_rate=3.0,
         variables=["acceleration_ratio", "validity", "sliding_mode"],
-    )  # fmt: skip
+    )
     near = (found.validity.values & Validity.NEAR_MODE_LIMIT) != 0
     ratio = found.acceleration_ratio.values
-    np.testing.assert_array_equal(near, (ratio >= 0.9) & (ratio <= 1.1) & (found.sliding_mode.values > 0))
+    np.testing.assert_array_equal(
+        near, (ratio >= 0.9) & (ratio <= 1.1) & (found.sliding_mode.values > 0)
+    )
     assert near.any()
     assert not near.all()
 
@@ -52,7 +64,9 @@ def test_flags_of_a_value_need_one_and_friction_parameters_have_those_before_the
 @pytest.mark.parametrize("solver", ["cycle", "step"])
 def test_a_ramp_that_ends_too_soon_moves_no_block_and_raises_no_flag(solver: str) -> None:
     """Between two ramps the shaking stays below the yield acceleration; the mode goes by the peak without them."""
-    found = slipsweep.sweep(5.0, 0.4, [3.2, 4.5], 1.0, excitation=slipsweep.Sine(1, 0.5, 0.5), solver=solver)
+    found = slipsweep.sweep(
+        5.0, 0.4, [3.2, 4.5], 1.0, excitation=slipsweep.Sine(1, 0.5, 0.5), solver=solver
+    )
     np.testing.assert_array_equal(found.permanent_displacement, [0.0, 0.0])
     np.testing.assert_array_equal(found.validity, [0, 0])
     assert (found.sliding_mode > 0).all()

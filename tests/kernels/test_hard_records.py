@@ -14,10 +14,20 @@ MOST_TIMES = 100
 def solved(cell: Cell) -> tuple[float, float, int]:
     """Displacement, peak velocity and slips of the package."""
     times = cell.times
-    record = Record.sampled(cell.samples, cell.interval) if times is None else Record(times, cell.samples)
+    record = (
+        Record.sampled(cell.samples, cell.interval)
+        if times is None
+        else Record(times, cell.samples)
+    )
     names = ["permanent_displacement", "peak_relative_velocity", "number_of_slips"]
     found = sweep(
-        0.0, 0.5, excitation=record, scale=cell.scale, yield_acceleration=cell.onset, model="newmark", variables=names
+        0.0,
+        0.5,
+        excitation=record,
+        scale=cell.scale,
+        yield_acceleration=cell.onset,
+        model="newmark",
+        variables=names,
     )
     return found[names[0]].item(), found[names[1]].item(), found[names[2]].item()
 
@@ -29,9 +39,14 @@ def test_newmark_within_100_times_the_conditioning(category: Category) -> None:
         exact, *bounds = conditioning(cell)
         with workdps(60):
             own = (exact.permanent_displacement, exact.peak_relative_velocity)
-            times = [float(abs(a - b) / bound) for a, b, bound in zip(solved(cell), own, bounds, strict=False)]
+            times = [
+                float(abs(a - b) / bound)
+                for a, b, bound in zip(solved(cell), own, bounds, strict=False)
+            ]
         if not max(times) <= MOST_TIMES:
-            wrong.append(f"{number}: {times[0]:.1e} (u) and {times[1]:.1e} (v) times the conditioning bound")
+            wrong.append(
+                f"{number}: {times[0]:.1e} (u) and {times[1]:.1e} (v) times the conditioning bound"
+            )
     assert not wrong
 
 
@@ -39,7 +54,11 @@ def test_a_million_samples() -> None:
     """A quarter of a million equal pulses, each of which comes to rest: u is that of one, times their number."""
     pulse = np.array([0.0, 1.0, 0.0, -1.0])
     exact, bound, _ = conditioning(Cell(np.append(pulse, 0.0), 0.3, interval=0.007))
-    displacement, velocity, slips = solved(Cell(np.append(np.tile(pulse, 250_000), 0.0), 0.3, interval=0.007))
+    displacement, velocity, slips = solved(
+        Cell(np.append(np.tile(pulse, 250_000), 0.0), 0.3, interval=0.007)
+    )
     assert slips == 250_000
-    assert abs(displacement / 250_000 - float(exact.permanent_displacement)) <= MOST_TIMES * float(bound)
+    assert abs(displacement / 250_000 - float(exact.permanent_displacement)) <= MOST_TIMES * float(
+        bound
+    )
     assert velocity == pytest.approx(float(exact.peak_relative_velocity), rel=1e-14)

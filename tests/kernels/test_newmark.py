@@ -20,7 +20,9 @@ G = 9.81
     ("theta", "mu_s", "amplitude", "frequency", "cycles"),
     [(10.0, 0.4, 4.0, 1.0, 3), (0.0, 0.3, 5.0, 2.0, 3), (5.0, 0.5, 5.0, 1.0, 2)],
 )
-def test_newmark_against_pyslammer(theta: float, mu_s: float, amplitude: float, frequency: float, cycles: int) -> None:
+def test_newmark_against_pyslammer(
+    theta: float, mu_s: float, amplitude: float, frequency: float, cycles: int
+) -> None:
     """pySLAMMER takes the trapezoidal rule from sample to sample, onset and stop at the samples: second order.
 
     At 256 samples a cycle it is seen to err by up to 4e-4 in these cells, so that 16384
@@ -32,19 +34,29 @@ def test_newmark_against_pyslammer(theta: float, mu_s: float, amplitude: float, 
     samples = 16384
     ground = amplitude * np.sin(2 * np.pi * np.arange(samples * cycles + 1) / samples)
     yield_acceleration = G * tan(atan(mu_s) - radians(theta))
-    analysis = RigidAnalysis(yield_acceleration / G_EARTH, GroundMotion(ground / G_EARTH, 1 / (samples * frequency)))
+    analysis = RigidAnalysis(
+        yield_acceleration / G_EARTH, GroundMotion(ground / G_EARTH, 1 / (samples * frequency))
+    )
     result = slipsweep.sweep(
         theta, mu_s, amplitude, frequency, model="newmark", excitation=slipsweep.Sine(cycles=cycles)
     )
-    assert analysis.max_sliding_disp == pytest.approx(float(result.permanent_displacement), rel=5e-7), "displacement"
-    assert analysis.sliding_vel.max() == pytest.approx(float(result.peak_relative_velocity), rel=5e-7), "peak velocity"
+    assert analysis.max_sliding_disp == pytest.approx(
+        float(result.permanent_displacement), rel=5e-7
+    ), "displacement"
+    assert analysis.sliding_vel.max() == pytest.approx(
+        float(result.peak_relative_velocity), rel=5e-7
+    ), "peak velocity"
 
 
 def test_newmark_to_the_last_digits() -> None:
     """Every share of yield in the peak, down to what a double can hold and up to one unit below the peak."""
-    random, amplitude, cycles = np.random.default_rng(11), 3.7, 7
+    random = np.random.default_rng(11)
+    amplitude = 3.7
+    cycles = 7
     near = 10.0 ** random.uniform(-15.0, 0.0, 150)
-    ratio = np.concatenate([random.uniform(0.0, 1.0, 150), near, 1.0 - near, [1e-300, 1e-17, np.nextafter(1.0, 0.0)]])
+    ratio = np.concatenate(
+        [random.uniform(0.0, 1.0, 150), near, 1.0 - near, [1e-300, 1e-17, np.nextafter(1.0, 0.0)]]
+    )
     onset = amplitude * ratio
     onset = onset[(onset > 0.0) & (onset < amplitude)]
     excitation = slipsweep.Sine(cycles=cycles)
@@ -56,7 +68,9 @@ def test_newmark_to_the_last_digits() -> None:
         for value, displacement, velocity in zip(*map(np.ndarray.tolist, found), strict=True):
             share = mpmath.mpf(value) / mpmath.mpf(amplitude)
             slid = cycles * amplitude * closed_forms.sine(share)
-            fastest = amplitude * (mpmath.sqrt(1 - share**2) - share * mpmath.acos(share)) / mpmath.pi
+            fastest = (
+                amplitude * (mpmath.sqrt(1 - share**2) - share * mpmath.acos(share)) / mpmath.pi
+            )
             assert abs(displacement / slid - 1) < 1.5e-15, f"displacement at {float(share)}"
             assert abs(velocity / fastest - 1) < 1.5e-15, f"peak velocity at {float(share)}"
 
@@ -67,9 +81,17 @@ def test_mendez_reduces_to_newmark_just_above_yield(solver: str, recoupling: str
     """Near yield Eq. 4 stays below Coulomb's value: b = Uy, and the pulse is over before Ug reverses."""
     theta = xr.DataArray([0.0, 5.0, 10.0, 20.0], dims="case")
     mu_s = xr.DataArray([0.3, 0.38, 0.4, 0.75], dims="case")
-    onset = slipsweep.friction_parameters(theta, mu_s, 1.0).yield_acceleration.drop_vars("amplitude")
+    onset = slipsweep.friction_parameters(theta, mu_s, 1.0).yield_acceleration.drop_vars(
+        "amplitude"
+    )
     excess = xr.DataArray(10.0 ** -np.arange(1.0, 9.0), dims="excess")
-    cells = {"theta": theta, "mu_s": mu_s, "amplitude": onset * (1 + excess), "frequency": 1.0, "cycles": 3}
+    cells = {
+        "theta": theta,
+        "mu_s": mu_s,
+        "amplitude": onset * (1 + excess),
+        "frequency": 1.0,
+        "cycles": 3,
+    }
     mendez = slipsweep.sweep(**choices(**cells, solver=solver, recoupling=recoupling))
     newmark = slipsweep.sweep(**choices(**cells, solver=solver, model="newmark"))
     assert (mendez.validity & 16 > 0).all(), "Eq. 4 stays below yield"
@@ -80,7 +102,11 @@ def test_mendez_reduces_to_newmark_just_above_yield(solver: str, recoupling: str
 
 def test_mendez_held_at_yield_is_newmark() -> None:
     """Where Eq. 4 stays below yield and recoupling is integrated, the two models are one block."""
-    axes: dict[str, Any] = {"theta": np.linspace(0.0, 25.0, 6), "mu_s": np.linspace(0.5, 0.8, 4), "frequency": 2.0}
+    axes: dict[str, Any] = {
+        "theta": np.linspace(0.0, 25.0, 6),
+        "mu_s": np.linspace(0.5, 0.8, 4),
+        "frequency": 2.0,
+    }
     axes |= {"amplitude": np.linspace(0.5, 12.0, 24), "excitation": slipsweep.Sine(cycles=4)}
     mendez = slipsweep.sweep(**axes, model=slipsweep.Mendez(recoupling="integrate"))
     newmark = slipsweep.sweep(**axes, model="newmark")
@@ -88,5 +114,9 @@ def test_mendez_held_at_yield_is_newmark() -> None:
     assert held.sum() > 20, "cells held at yield"
     for name in ("permanent_displacement", "peak_relative_velocity"):
         np.testing.assert_allclose(
-            mendez[name].to_numpy()[held], newmark[name].to_numpy()[held], rtol=1e-12, atol=0, err_msg=name
+            mendez[name].to_numpy()[held],
+            newmark[name].to_numpy()[held],
+            rtol=1e-12,
+            atol=0,
+            err_msg=name,
         )

@@ -52,9 +52,13 @@ def shaking() -> Record:
 
 
 @kernel
-def _followed(cell: tuple[float, float, float, float, float, float, float], pieces: np.ndarray) -> tuple[float, float]:
+def _followed(
+    cell: tuple[float, float, float, float, float, float, float], pieces: np.ndarray
+) -> tuple[float, float]:
     options = Options(MONOTONE, EQ12, 1, True, G)
-    block = block_of(exponential(), 1.0, Cell(*cell), interface_of(Cell(*cell), MONOTONE, G), options)
+    block = block_of(
+        exponential(), 1.0, Cell(*cell), interface_of(Cell(*cell), MONOTONE, G), options
+    )
     return eq4_integrals(block, pieces[0], pieces[0].begin, pieces[0].finish)
 
 
@@ -68,8 +72,11 @@ def _follow(decay: float, x: float, change: float) -> tuple[float, float]:
 def _exact(decay: float, x: float, change: float) -> tuple[mpfr, mpfr]:
     """∫ D and ∫ (1 − t) D over a unit of time, by the reference."""
     with workdps(40):
-        g, (section,) = mpfr(G), sections_of_record([0, 1], [mpfr(x), mpfr(x) + mpfr(change)])
-        interface = Interface(g, mpfr(tan(radians(8.0))), mpfr(0.4), mpfr(0.1), mpfr(decay), mpfr(1))
+        g = mpfr(G)
+        (section,) = sections_of_record([0, 1], [mpfr(x), mpfr(x) + mpfr(change)])
+        interface = Interface(
+            g, mpfr(tan(radians(8.0))), mpfr(0.4), mpfr(0.1), mpfr(decay), mpfr(1)
+        )
 
         def rate(ground: mpfr) -> mpfr:
             return interface.relative_acceleration(ground, section.side)
@@ -78,10 +85,21 @@ def _exact(decay: float, x: float, change: float) -> tuple[mpfr, mpfr]:
 
 
 #: At the last two λ/g times a change of 3 is 2, where series and closed form meet.
-@pytest.mark.parametrize("decay", [0.0, 1e-9, 0.3, 4.0, 60.0, 5e4, 2 / 3 * G * (1 - 1e-13), 2 / 3 * G * (1 + 1e-13)])
+@pytest.mark.parametrize(
+    "decay", [0.0, 1e-9, 0.3, 4.0, 60.0, 5e4, 2 / 3 * G * (1 - 1e-13), 2 / 3 * G * (1 + 1e-13)]
+)
 @pytest.mark.parametrize(
     ("x", "change"),
-    [(1.0, 3.0), (4.0, -3.0), (2.0, 1e-7), (0.0, 5.0), (5.0, -5.0), (-1.0, -3.0), (-4.0, 4.0), (2.0, 0)],
+    [
+        (1.0, 3.0),
+        (4.0, -3.0),
+        (2.0, 1e-7),
+        (0.0, 5.0),
+        (5.0, -5.0),
+        (-1.0, -3.0),
+        (-4.0, 4.0),
+        (2.0, 0),
+    ],
 )
 def test_integrals_of_eq4_on_a_linear_piece(decay: float, x: float, change: float) -> None:
     """From no decay to a friction that lives in a thousandth of the piece, rising and falling, on both sides."""
@@ -93,7 +111,9 @@ def test_integrals_of_eq4_on_a_linear_piece(decay: float, x: float, change: floa
 
 
 @pytest.mark.filterwarnings("ignore")  # pySLAMMER's own
-@pytest.mark.parametrize("name", ["Northridge_1994_PAC-175", "Cape_Mendocino_1992_PET-090", "Duzce_1999_375-090"])
+@pytest.mark.parametrize(
+    "name", ["Northridge_1994_PAC-175", "Cape_Mendocino_1992_PET-090", "Duzce_1999_375-090"]
+)
 def test_newmark_against_pyslammer_on_its_ground_motions(name: str) -> None:
     """pySLAMMER finds onset and stop at samples: refining the same straight lines, it comes to this answer.
 
@@ -108,11 +128,17 @@ def test_newmark_against_pyslammer_on_its_ground_motions(name: str) -> None:
     peak = int(np.argmax(np.abs(motion.accel)))
     values = motion.accel[max(peak - 300, 0) : peak + 300]
     exact = displacement(
-        Record.sampled(values * g, motion.dt), theta=0.0, mu_s=0.3, yield_acceleration=0.1 * g, model="newmark"
+        Record.sampled(values * g, motion.dt),
+        theta=0.0,
+        mu_s=0.3,
+        yield_acceleration=0.1 * g,
+        model="newmark",
     )
     errors = []
     for parts in (1, 4, 16):
-        fine = np.interp(np.arange((values.size - 1) * parts + 1) / parts, np.arange(values.size), values)
+        fine = np.interp(
+            np.arange((values.size - 1) * parts + 1) / parts, np.arange(values.size), values
+        )
         # rest at the end, for the block to run out
         fine = np.concatenate([fine, np.zeros(100 * parts)])
         analysis = pyslammer.RigidAnalysis(0.1, pyslammer.GroundMotion(fine, motion.dt / parts))
@@ -156,14 +182,22 @@ def assert_is_reference(record: Record, cell: dict[str, Any], rel: float = 1e-11
         ("Northridge_1994_PAC-175", 5.0, {**PRINTED, "rise": "literal"}, (6, 0)),
     ],
 )
-def test_mendez_on_recorded_motions(name: str, peak: float, given: dict[str, Any], modes: tuple[int, int]) -> None:
+def test_mendez_on_recorded_motions(
+    name: str, peak: float, given: dict[str, Any], modes: tuple[int, int]
+) -> None:
     """Five seconds about the largest acceleration, scaled to `peak`, against the reference."""
     import pyslammer
 
     motion = pyslammer.load_sample_ground_motion(name)
-    largest, half = int(np.argmax(np.abs(motion.accel))), round(2.5 / motion.dt)
+    largest = int(np.argmax(np.abs(motion.accel)))
+    half = round(2.5 / motion.dt)
     record = Record.sampled(motion.accel[max(largest - half, 0) : largest + half] * G, motion.dt)
-    cell = {"theta": 5.0, "mu_s": 0.38, "scale": peak / float(np.abs(record.acceleration).max()), **given}
+    cell = {
+        "theta": 5.0,
+        "mu_s": 0.38,
+        "scale": peak / float(np.abs(record.acceleration).max()),
+        **given,
+    }
     expected = assert_is_reference(record, cell)
     assert (expected.stick_slip_pulses, expected.continuous_pulses) == modes
     assert expected.permanent_displacement > 1e-6
@@ -171,9 +205,23 @@ def test_mendez_on_recorded_motions(name: str, peak: float, given: dict[str, Any
 
 def test_a_rise_beyond_a_turn_of_eq4_comes_to_an_end() -> None:
     """A pulse of an earthquake in which the part from a turn of Eq. 4 on ended, by rounding, at that turn."""
-    values = (-0.97, 0.0313594111705, 0.90939222913, 1.38378696155, 1.5104986862, 1.55004890565, 1.51117534505, 1.0644)
+    values = (
+        -0.97,
+        0.0313594111705,
+        0.90939222913,
+        1.38378696155,
+        1.5104986862,
+        1.55004890565,
+        1.51117534505,
+        1.0644,
+    )
     record = Record.sampled([*values, 0.0], 0.005)
-    cell = {"theta": 0.0, "mu_s": 0.3, "yield_acceleration": 0.7238795543933454, "scale": 0.5414165300481509}
+    cell = {
+        "theta": 0.0,
+        "mu_s": 0.3,
+        "yield_acceleration": 0.7238795543933454,
+        "scale": 0.5414165300481509,
+    }
     assert_is_reference(record, cell)
 
 
@@ -183,13 +231,21 @@ def test_a_block_that_stops_on_a_plateau_slides_again_at_once(recoupling: str) -
 
     On the rise that follows b goes on from c, not from what it was on the rise to the plateau.
     """
-    times, values = np.array([0.0, 0.04, 0.06, 0.12, 0.14, 0.2]), np.array([5.0, 1.9, 2.1, 2.1, 4.8, 0.0])
-    cell: dict[str, Any] = {"theta": 15.0, "mu_s": 0.4, "yield_acceleration": 1.0, "recoupling": recoupling}
+    times = np.array([0.0, 0.04, 0.06, 0.12, 0.14, 0.2])
+    values = np.array([5.0, 1.9, 2.1, 2.1, 4.8, 0.0])
+    cell: dict[str, Any] = {
+        "theta": 15.0,
+        "mu_s": 0.4,
+        "yield_acceleration": 1.0,
+        "recoupling": recoupling,
+    }
     expected = assert_is_reference(Record(times, values), cell)
     assert expected.number_of_slips == 2
     finer = np.union1d(times, np.linspace(0.06, 0.12, 38))
     again = Record(finer, np.interp(finer, times, values))
-    assert displacement(again, **cell) == pytest.approx(float(expected.permanent_displacement), rel=1e-12)
+    assert displacement(again, **cell) == pytest.approx(
+        float(expected.permanent_displacement), rel=1e-12
+    )
 
 
 @pytest.mark.parametrize("seed", range(0, 200, 50))
@@ -214,7 +270,9 @@ def test_mendez_on_made_up_records(seed: int) -> None:
         ({"yield_acceleration": 0.59, "decay_rate": 2.7}, (5.0, 0.38, 3.55, 1.8)),
     ],
 )
-def test_finely_sampled_sine(options: dict[str, Any], cell: tuple[float, float, float, float]) -> None:
+def test_finely_sampled_sine(
+    options: dict[str, Any], cell: tuple[float, float, float, float]
+) -> None:
     """Straight lines lie under a sine by up to h²/8: the response to them differs in second order."""
     theta, mu_s, amplitude, frequency = cell
     sine = slipsweep.sweep(theta, mu_s, amplitude, frequency, **choices(cycles=3, **options))
@@ -233,13 +291,20 @@ def test_finely_sampled_sine(options: dict[str, Any], cell: tuple[float, float, 
         ({}, (8.0, 0.3, 2.9, 1.0)),
         ({"yield_acceleration": 0.59, "decay_rate": 2.7, "delta_mu": 0.09}, (5.0, 0.38, 3.55, 1.8)),
         ({"yield_acceleration": 0.59, "recoupling": "integrate"}, (5.0, 0.38, 3.55, 1.8)),
-        ({"yield_acceleration": 0.59, "decay_rate": 2.7, "rise": "literal"}, (5.0, 0.38, 3.55, 1.8)),
+        (
+            {"yield_acceleration": 0.59, "decay_rate": 2.7, "rise": "literal"},
+            (5.0, 0.38, 3.55, 1.8),
+        ),
     ],
 )
-def test_a_triangle_is_its_own_record(options: dict[str, Any], cell: tuple[float, float, float, float]) -> None:
+def test_a_triangle_is_its_own_record(
+    options: dict[str, Any], cell: tuple[float, float, float, float]
+) -> None:
     """A wave of straight lines is a record of its corners: two ways through other pieces to one answer."""
     theta, mu_s, amplitude, frequency = cell
-    wave = slipsweep.sweep(theta, mu_s, amplitude, frequency, **choices(cycles=3, waveform="triangle", **options))
+    wave = slipsweep.sweep(
+        theta, mu_s, amplitude, frequency, **choices(cycles=3, waveform="triangle", **options)
+    )
     times = np.arange(13) / (4 * frequency)
     record = Record(times, amplitude * np.array([0.0, *[1.0, 0.0, -1.0, 0.0] * 3]))
     result = sweep(theta, mu_s, **choices(**options, excitation=record))
@@ -250,7 +315,8 @@ def test_a_triangle_is_its_own_record(options: dict[str, Any], cell: tuple[float
 
 def test_modes_alternate_between_pulses() -> None:
     """A pulse in each mode and one below yield, at rest between them: the sum of what each does alone."""
-    theta, mu_s = 5.0, 0.4
+    theta = 5.0
+    mu_s = 0.4
     limit = float(slipsweep.friction_parameters(theta, mu_s, 5.0).limiting_acceleration)
     shape = np.array([0.0, 1.0, 0.0, -0.5, 0.0, 0.0])
     peaks = [0.8 * limit, 1.2 * limit, 1.0]
@@ -278,41 +344,72 @@ MODELS = pytest.mark.parametrize(
 
 @MODELS
 def test_time_scale_and_polarity(shaking: Record, options: dict[str, Any]) -> None:
-    grid = {"theta": [0.0, 5.0, 10.0], "mu_s": [0.3, 0.4, 0.5], "scale": [0.5, 1.0, 1.5], **choices(**options)}
+    grid = {
+        "theta": [0.0, 5.0, 10.0],
+        "mu_s": [0.3, 0.4, 0.5],
+        "scale": [0.5, 1.0, 1.5],
+        **choices(**options),
+    }
     swept = sweep(time_scale=[1.0, 1.7], polarity="both", **grid, excitation=shaking)
     for sign in (1, -1):
         direct = sweep(**grid, excitation=Record(1.7 * shaking.times, sign * shaking.acceleration))
         part = swept.sel(time_scale=1.7, polarity=sign)
         for name in EVERY:
-            np.testing.assert_allclose(part[name], direct[name], rtol=2e-11, atol=1e-14, err_msg=name)
-    longer, as_recorded = swept.sel(time_scale=1.7), swept.sel(time_scale=1.0)
+            np.testing.assert_allclose(
+                part[name], direct[name], rtol=2e-11, atol=1e-14, err_msg=name
+            )
+    longer = swept.sel(time_scale=1.7)
+    as_recorded = swept.sel(time_scale=1.0)
     assert (as_recorded.permanent_displacement > 0).any()
     for name, power in (("permanent_displacement", 2), ("peak_relative_velocity", 1)):
-        np.testing.assert_allclose(longer[name], 1.7**power * as_recorded[name], rtol=1e-15, err_msg=name)
+        np.testing.assert_allclose(
+            longer[name], 1.7**power * as_recorded[name], rtol=1e-15, err_msg=name
+        )
 
 
 @pytest.mark.parametrize("step", [0.0, 0.25])
 def test_a_sweep_is_what_a_history_ends_with(shaking: Record, step: float) -> None:
     """A history goes by the general rules through all pulses, a sweep by one loop through most; steps make plateaus."""
     rng = np.random.default_rng(3)
-    record = Record(shaking.times, np.round(shaking.acceleration / step) * step) if step else shaking
+    record = (
+        Record(shaking.times, np.round(shaking.acceleration / step) * step) if step else shaking
+    )
     for _ in range(10):
-        theta, onset, scale = rng.uniform(0.0, 20.0), rng.uniform(0.1, 3.0), rng.uniform(0.3, 2.0)
-        cell = {"theta": theta, "mu_s": tan(radians(theta)) + rng.uniform(0.05, 0.5), "yield_acceleration": onset}
+        theta = rng.uniform(0.0, 20.0)
+        onset = rng.uniform(0.1, 3.0)
+        scale = rng.uniform(0.3, 2.0)
+        cell = {
+            "theta": theta,
+            "mu_s": tan(radians(theta)) + rng.uniform(0.05, 0.5),
+            "yield_acceleration": onset,
+        }
         swept = sweep(**choices(**cell, excitation=record, scale=scale))
-        history = slipsweep.simulate(**choices(**cell, excitation=record, scale=scale, times=[0.0, 1e4]))
+        history = slipsweep.simulate(
+            **choices(**cell, excitation=record, scale=scale, times=[0.0, 1e4])
+        )
         np.testing.assert_allclose(
-            swept.permanent_displacement, history.relative_displacement[-1], rtol=1e-11, err_msg=str((cell, scale))
+            swept.permanent_displacement,
+            history.relative_displacement[-1],
+            rtol=1e-11,
+            err_msg=str((cell, scale)),
         )
 
 
 @MODELS
-def test_amplitude_is_the_peak_that_the_record_is_scaled_to(shaking: Record, options: dict[str, Any]) -> None:
+def test_amplitude_is_the_peak_that_the_record_is_scaled_to(
+    shaking: Record, options: dict[str, Any]
+) -> None:
     """The same bits as under the scale, amplitude over the record's own peak, whichever sign that has."""
     amplitude = np.array([0.5, 2.0, 4.5])
     for record in (shaking, Record(shaking.times, -2.5 * shaking.acceleration)):
         peak = np.abs(record.acceleration).max()
-        block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.4, "time_scale": 1.5, "polarity": "both", **choices(**options)}
+        block: dict[str, Any] = {
+            "theta": 5.0,
+            "mu_s": 0.4,
+            "time_scale": 1.5,
+            "polarity": "both",
+            **choices(**options),
+        }
         scaled = sweep(**block, scale=amplitude / peak, excitation=record)
         found = sweep(**block, amplitude=amplitude, excitation=record)
         assert found.permanent_displacement.dims == ("amplitude", "polarity")
@@ -330,7 +427,13 @@ def test_the_block_slides_once_the_peak_passes_the_yield_acceleration(shaking: R
     for onset in (0.3, 2.0):
         amplitude = onset * np.array([1 - 1e-9, 1 + 1e-6])
         slides = sweep(
-            5.0, 0.6, amplitude, yield_acceleration=onset, polarity=sign, excitation=shaking, model="newmark"
+            5.0,
+            0.6,
+            amplitude,
+            yield_acceleration=onset,
+            polarity=sign,
+            excitation=shaking,
+            model="newmark",
         ).number_of_slips
         assert slides.values.tolist() == [0, 1]
 
@@ -346,10 +449,15 @@ def test_the_block_slides_once_the_peak_passes_the_yield_acceleration(shaking: R
         ),
         ({"displacement_amplitude": 1.0}, "displacement_amplitude: not allowed with a Record"),
         ({"structure_frequency": 1.0}, "structure_frequency: not allowed with a Record"),
-        ({"solver": "step"}, "solver = Step(rule='trapezoid', steps_per_cycle=1024): not allowed with a Record"),
+        (
+            {"solver": "step"},
+            "solver = Step(rule='trapezoid', steps_per_cycle=1024): not allowed with a Record",
+        ),
     ],
 )
-def test_what_does_not_go_with_a_record(shaking: Record, given: dict[str, Any], message: str) -> None:
+def test_what_does_not_go_with_a_record(
+    shaking: Record, given: dict[str, Any], message: str
+) -> None:
     with pytest.raises(InputError) as error:
         sweep(5.0, 0.4, **given, excitation=shaking)
     assert str(error.value).startswith(message)
@@ -357,34 +465,44 @@ def test_what_does_not_go_with_a_record(shaking: Record, given: dict[str, Any], 
 
 def test_what_goes_with_a_record_only() -> None:
     for name in ("scale", "time_scale", "polarity"):
-        with pytest.raises(InputError, match=f"{name}: not allowed with a waveform, which takes amplitude"):
+        with pytest.raises(
+            InputError, match=f"{name}: not allowed with a waveform, which takes amplitude"
+        ):
             sweep(5.0, 0.4, 3.0, 1.0, **{name: 1})  # type: ignore[arg-type]
 
 
 def test_a_record_without_acceleration_has_no_scale() -> None:
     still = Record(np.arange(3.0), np.zeros(3))
-    with pytest.raises(InputError, match="amplitude: record has no acceleration to scale; give scale"):
+    with pytest.raises(
+        InputError, match="amplitude: record has no acceleration to scale; give scale"
+    ):
         sweep(5.0, 0.4, 1.0, excitation=still)
     assert sweep(5.0, 0.4, scale=1.0, excitation=still).permanent_displacement.item() == 0.0
 
 
 @MODELS
-def test_samples_added_on_the_lines_change_nothing(shaking: Record, options: dict[str, Any]) -> None:
+def test_samples_added_on_the_lines_change_nothing(
+    shaking: Record, options: dict[str, Any]
+) -> None:
     middle = 0.5 * (shaking.times[1:] + shaking.times[:-1])
     times = np.sort(np.concatenate([shaking.times, middle]))
     finer = Record(times, np.interp(times, shaking.times, shaking.acceleration))
     grid = {"theta": [0.0, 6.0], "mu_s": [0.3, 0.45], "scale": [0.6, 1.4], **choices(**options)}
-    one, two = sweep(**grid, excitation=shaking), sweep(**grid, excitation=finer)
+    one = sweep(**grid, excitation=shaking)
+    two = sweep(**grid, excitation=finer)
     for name in EVERY:
         np.testing.assert_allclose(one[name], two[name], rtol=1e-9, atol=1e-13, err_msg=name)
 
 
 def test_mendez_held_at_yield_is_newmark(shaking: Record) -> None:
     """Where Eq. 4 asks for nothing above Üy and recoupling is integrated, the two models are one block."""
-    theta, mu_s = 5.0, 0.5
+    theta = 5.0
+    mu_s = 0.5
     onset = float(slipsweep.friction_parameters(theta, mu_s, 1.0).yield_acceleration)
     scale = 1.05 * onset / float(shaking.acceleration.max())
-    mendez = sweep(theta, mu_s, scale=scale, excitation=shaking, model=slipsweep.Mendez(recoupling="integrate"))
+    mendez = sweep(
+        theta, mu_s, scale=scale, excitation=shaking, model=slipsweep.Mendez(recoupling="integrate")
+    )
     newmark = sweep(theta, mu_s, scale=scale, excitation=shaking, model="newmark")
     assert float(newmark.permanent_displacement) > 0
     for name in (*RESULTS, *COUNTS):
@@ -394,14 +512,21 @@ def test_mendez_held_at_yield_is_newmark(shaking: Record) -> None:
 
 def test_only_an_acceleration_up_the_slope_lifts_the_block() -> None:
     """n = g + Üg tan θ ≤ 0: a peak beyond g / tan θ in the other direction has a value, that of the reference."""
-    record, cell = Record.sampled([0.0, 0.0, 30.0, 0.0], 0.05), {"theta": 20.0, "mu_s": 0.6}
+    record = Record.sampled([0.0, 0.0, 30.0, 0.0], 0.05)
+    cell = {"theta": 20.0, "mu_s": 0.6}
     assert assert_is_reference(record, cell).continuous_pulses == 1
-    assert int(sweep(20.0, 0.6, excitation=record, polarity=-1).validity) == slipsweep.Validity.UPLIFT
+    assert (
+        int(sweep(20.0, 0.6, excitation=record, polarity=-1).validity) == slipsweep.Validity.UPLIFT
+    )
 
 
 def test_dimensions(shaking: Record) -> None:
     theta = xr.DataArray([0.0, 5.0], dims="case", coords={"case": ["a", "b"]})
-    axes: dict[str, Any] = {"mu_s": [0.3, 0.4, 0.5], "scale": [0.5, 1.0, 1.5, 2.0], "time_scale": [1.0]}
+    axes: dict[str, Any] = {
+        "mu_s": [0.3, 0.4, 0.5],
+        "scale": [0.5, 1.0, 1.5, 2.0],
+        "time_scale": [1.0],
+    }
     result = sweep(theta, **axes, polarity="both", excitation=shaking, model="newmark")
     assert dict(result.sizes) == {"mu_s": 3, "case": 2, "scale": 4, "time_scale": 1, "polarity": 2}
     one = sweep(5.0, 0.4, scale=1.5, polarity=-1, excitation=shaking, model="newmark")

@@ -15,7 +15,12 @@ CELLS: dict[Validity, dict[str, Any]] = {
     Validity.STATICALLY_UNSTABLE: {"theta": 10.0, "mu_s": 0.1, "amplitude": 2.0},
     Validity.UPLIFT: {"theta": 45.0, "mu_s": 1.5, "amplitude": 9.9},
     Validity.LIMIT_UNDEFINED: {"theta": 45.0, "mu_s": 2.5, "amplitude": 3.0},
-    Validity.FRICTION_NOT_DECAYING: {"theta": 0.0, "mu_s": 1.5, "amplitude": 14.0, "yield_acceleration": 1.0},
+    Validity.FRICTION_NOT_DECAYING: {
+        "theta": 0.0,
+        "mu_s": 1.5,
+        "amplitude": 14.0,
+        "yield_acceleration": 1.0,
+    },
     Validity.KD_NOT_POSITIVE: {"theta": 10.0, "mu_s": 0.5, "amplitude": 3.2, "rise": "literal"},
 }
 FLAGS = pytest.mark.parametrize("flag", CELLS, ids=lambda flag: flag.name)
@@ -27,13 +32,18 @@ WAVES: list[dict[str, Any]] = [
 ]
 SOLVERS: list[dict[str, Any]] = [
     {"solver": "cycle"},
-    *({"solver": "step", "rule": rule, "steps_per_cycle": 256} for rule in ("rectangle", "trapezoid", "simpson")),
+    *(
+        {"solver": "step", "rule": rule, "steps_per_cycle": 256}
+        for rule in ("rectangle", "trapezoid", "simpson")
+    ),
 ]
 
 
 def assert_no_value(found: xr.Dataset, flag: Validity) -> None:
     assert int(found.validity) & flag
-    assert not int(found.validity) & (Validity.UPSLOPE | Validity.NEAR_MODE_LIMIT | Validity.FRICTION_ESTIMATED)
+    assert not int(found.validity) & (
+        Validity.UPSLOPE | Validity.NEAR_MODE_LIMIT | Validity.FRICTION_ESTIMATED
+    )
     assert np.isnan(found.permanent_displacement), "displacement"
     assert np.isnan(found.peak_relative_velocity), "velocity"
 
@@ -55,9 +65,16 @@ def test_sweep_gives_no_value(flag: Validity, wave: dict[str, Any]) -> None:
 @pytest.mark.parametrize("wave", WAVES, ids=str)
 def test_history_gives_no_value(flag: Validity, wave: dict[str, Any]) -> None:
     """From its beginning, also where only a later pulse takes the value."""
-    history = slipsweep.simulate(**choices(**CELLS[flag], **wave, frequency=1.0, times=[0.0, 0.01, 0.3, 5.0, 60.0]))
+    history = slipsweep.simulate(
+        **choices(**CELLS[flag], **wave, frequency=1.0, times=[0.0, 0.01, 0.3, 5.0, 60.0])
+    )
     assert_no_value(history, flag)
-    for name in ("block_acceleration", "friction_coefficient", "relative_velocity", "relative_displacement"):
+    for name in (
+        "block_acceleration",
+        "friction_coefficient",
+        "relative_velocity",
+        "relative_displacement",
+    ):
         assert np.isnan(history[name]).all(), name
     assert np.isfinite(history.ground_acceleration).all(), "the plane moves all the same"
 
@@ -76,7 +93,11 @@ def test_record_gives_no_value(flag: Validity) -> None:
 @pytest.mark.parametrize("wave", WAVES, ids=str)
 def test_grids_of_literal_rises(wave: dict[str, Any]) -> None:
     """Where Eq. 12 has nothing to brake with, beside cells that have a value: one mask for all results."""
-    axes: dict[str, Any] = {"theta": np.linspace(0.0, 20.0, 7), "mu_s": np.linspace(0.2, 1.0, 7), "frequency": 1.0}
+    axes: dict[str, Any] = {
+        "theta": np.linspace(0.0, 20.0, 7),
+        "mu_s": np.linspace(0.2, 1.0, 7),
+        "frequency": 1.0,
+    }
     axes |= {"amplitude": np.linspace(0.5, 9.0, 30), "rise": "literal", "cycles": 3}
     for solver in SOLVERS:
         found = slipsweep.sweep(**choices(**axes, **wave, **solver))
@@ -90,10 +111,18 @@ def test_grids_of_literal_rises(wave: dict[str, Any]) -> None:
 @pytest.mark.parametrize("solver", SOLVERS, ids=str)
 def test_a_shaking_that_ends_in_a_rise_leaves_nothing_to_brake_with(solver: dict[str, Any]) -> None:
     """The ramp keeps the first rise below yield: the last one, up to the end of the shaking, is the only one."""
-    cell = {"theta": 0.0, "mu_s": 0.337, "amplitude": 1.44, "yield_acceleration": 0.81, "decay_rate": 51.7}
+    cell = {
+        "theta": 0.0,
+        "mu_s": 0.337,
+        "amplitude": 1.44,
+        "yield_acceleration": 0.81,
+        "decay_rate": 51.7,
+    }
     shaking = {"waveform": "cosine", "cycles": 1, "ramp_in": 0.25}
     for recoupling in ("eq12", "integrate"):
         found = slipsweep.sweep(
-            **choices(**cell, **shaking, **solver, frequency=0.1, rise="literal", recoupling=recoupling)
+            **choices(
+                **cell, **shaking, **solver, frequency=0.1, rise="literal", recoupling=recoupling
+            )
         )
         assert_no_value(found, Validity.KD_NOT_POSITIVE)

@@ -9,7 +9,9 @@ import pytest
 from slipsweep.kernels.block import opposite
 from slipsweep.model import equations as eq
 
-MU_S, TAN_THETA, G = 0.38, math.tan(math.radians(5.0)), 9.81
+MU_S = 0.38
+TAN_THETA = math.tan(math.radians(5.0))
+G = 9.81
 
 
 @pytest.mark.parametrize("ground", [0.7, 2.0, 3.5])
@@ -18,7 +20,9 @@ def test_eq1_gives_back_the_friction_of_eq4(ground: float, friction: float) -> N
     block = eq.block_acceleration(ground, friction, MU_S, TAN_THETA, G)
     # Eq. 1 holds the magnitudes: Eq. 4 has to ask for an acceleration along the plane's
     if block > 0.0:
-        assert eq.mobilised_friction(ground, block, MU_S, TAN_THETA, G) == pytest.approx(friction, rel=1e-13)
+        assert eq.mobilised_friction(ground, block, MU_S, TAN_THETA, G) == pytest.approx(
+            friction, rel=1e-13
+        )
     else:
         assert friction < MU_S - TAN_THETA - (ground - G * TAN_THETA) / (G + ground * TAN_THETA)
 
@@ -29,7 +33,9 @@ def test_eqs_2_and_3_are_the_force_normal_to_the_plane(ground: float, theta: flo
     """N/m is what weight and the plane's horizontal acceleration have normal to it; over cos θ."""
     angle = math.radians(theta)
     normal = G * math.cos(angle) + ground * math.sin(angle)
-    assert eq.normal_acceleration(ground, math.tan(angle), G) == pytest.approx(normal / math.cos(angle), rel=1e-14)
+    assert eq.normal_acceleration(ground, math.tan(angle), G) == pytest.approx(
+        normal / math.cos(angle), rel=1e-14
+    )
 
 
 def test_eq7_is_eq4_without_friction_at_yield() -> None:
@@ -44,22 +50,30 @@ def test_eqs_10_and_11_meet_where_the_modes_do() -> None:
 
 
 def test_eq6_without_an_excess_is_eq5() -> None:
-    assert eq.friction_coefficient(2.0, MU_S, 0.0, 2.7, G) == pytest.approx(MU_S * math.exp(-2.7 * 2.0 / G))
+    assert eq.friction_coefficient(2.0, MU_S, 0.0, 2.7, G) == pytest.approx(
+        MU_S * math.exp(-2.7 * 2.0 / G)
+    )
 
 
 def test_eq12_brakes_evenly_and_not_backwards() -> None:
     held = 1.5  # g Kd
     assert eq.attenuated_velocity(0.3, held, 0.1) == pytest.approx(0.3 - 1.5 * 0.1, rel=1e-14)
     assert eq.attenuated_velocity(0.3, held, 0.5) == 0.0
-    assert eq.attenuated_displacement(0.3, held, 0.1) == pytest.approx(0.3 * 0.1 - 1.5 * 0.1**2 / 2, rel=1e-14)
+    assert eq.attenuated_displacement(0.3, held, 0.1) == pytest.approx(
+        0.3 * 0.1 - 1.5 * 0.1**2 / 2, rel=1e-14
+    )
     for after_the_stop in (0.2, 0.5, math.inf):
-        assert eq.attenuated_displacement(0.3, held, after_the_stop) == pytest.approx(0.3**2 / 3.0, rel=1e-14)
+        assert eq.attenuated_displacement(0.3, held, after_the_stop) == pytest.approx(
+            0.3**2 / 3.0, rel=1e-14
+        )
 
 
 @pytest.mark.parametrize("ground", [-6.0, -0.4, 0.2, 3.5])
 def test_slopes_of_eq4_are_those_of_its_values(ground: float) -> None:
     """By central differences, whose error is the square of their step."""
-    decay, delta_mu, step = 0.3, 0.1, 1e-4
+    decay = 0.3
+    delta_mu = 0.1
+    step = 1e-4
 
     def friction(x: float) -> float:
         return eq.friction_coefficient(x, MU_S, delta_mu, decay, 1.0)
@@ -68,12 +82,16 @@ def test_slopes_of_eq4_are_those_of_its_values(ground: float) -> None:
         return eq.relative_acceleration(x, friction(x), MU_S, TAN_THETA, G)
 
     def slope(x: float) -> float:
-        return eq.relative_acceleration_slope(x, friction(x), -decay * friction(x), MU_S, TAN_THETA, G)
+        return eq.relative_acceleration_slope(
+            x, friction(x), -decay * friction(x), MU_S, TAN_THETA, G
+        )
 
     values, slopes = ((f(ground + step) - f(ground - step)) / (2 * step) for f in (rate, slope))
     assert slope(ground) == pytest.approx(values, rel=1e-8)
     derivatives = -decay * friction(ground), decay**2 * friction(ground)
-    assert eq.relative_acceleration_curvature(ground, *derivatives, TAN_THETA, G) == pytest.approx(slopes, rel=1e-8)
+    assert eq.relative_acceleration_curvature(ground, *derivatives, TAN_THETA, G) == pytest.approx(
+        slopes, rel=1e-8
+    )
 
 
 @numba.njit(error_model="numpy")
@@ -86,5 +104,7 @@ def test_equations_answer_python_and_jitted_functions_alike() -> None:
     whole = [_lag(2, 0), eq.lag(2, 0, MU_S, TAN_THETA, G), eq.lag.py_func(2, 0, MU_S, TAN_THETA, G)]  # type: ignore[attr-defined]
     assert whole == pytest.approx([whole[0]] * 3, rel=1e-14)
     fractions = [eq.lag(0.7, friction=0.2, mu_s=MU_S, tan_theta=TAN_THETA, g=G), _lag(0.7, 0.2)]
-    assert fractions == pytest.approx([G * (MU_S - 0.2) + 0.7 * TAN_THETA * (MU_S - TAN_THETA - 0.2)] * 2, rel=1e-14)
+    assert fractions == pytest.approx(
+        [G * (MU_S - 0.2) + 0.7 * TAN_THETA * (MU_S - TAN_THETA - 0.2)] * 2, rel=1e-14
+    )
     assert [opposite(-1.0, 2.0), opposite(1.0, 2.0)] == [True, False]

@@ -26,7 +26,10 @@ FUNCTIONS: dict[str, tuple[Callable[..., xr.Dataset], dict[str, Any]]] = {
     "friction_parameters": (slipsweep.friction_parameters, {**BLOCK, "amplitude": 3.0}),
     "simulate": (slipsweep.simulate, CELL),
     "sweep of a record": (slipsweep.sweep, {"excitation": RECORD, **BLOCK}),
-    "limit_amplitude": (slipsweep.limit_amplitude, {"displacement": 0.1, **BLOCK, "frequency": 1.0}),
+    "limit_amplitude": (
+        slipsweep.limit_amplitude,
+        {"displacement": 0.1, **BLOCK, "frequency": 1.0},
+    ),
     "sample": (slipsweep.sample, {**CELL, "uncertain": UNCERTAIN, "samples": 8}),
 }
 
@@ -78,7 +81,9 @@ def test_stacked_coordinates_come_apart() -> None:
     assert found.site.values.tolist() == ["a", "b", "c"] * 2
     np.testing.assert_array_equal(found.mu_s, np.repeat([0.3, 0.4], 3))
     crossed = call("sweep", theta=grid.theta, mu_s=grid.mu_s).permanent_displacement
-    np.testing.assert_array_equal(found.permanent_displacement, crossed.transpose("mu_s", "site").values.ravel())
+    np.testing.assert_array_equal(
+        found.permanent_displacement, crossed.transpose("mu_s", "site").values.ravel()
+    )
 
 
 @pytest.mark.parametrize("function", ["sweep", "sample"])
@@ -88,19 +93,29 @@ def test_coordinates_and_dimensions_named_like_a_result(function: str) -> None:
         xr.DataArray([1.0, 2.0], dims="case", coords={name: ("case", [1, 2])}),
         xr.DataArray([1.0, 2.0], dims=name),
     ):
-        with pytest.raises(InputError, match=f"{name}.* is the name of a result|{name}.* has the name of a result"):
+        with pytest.raises(
+            InputError, match=f"{name}.* is the name of a result|{name}.* has the name of a result"
+        ):
             call(function, theta=theta)
 
 
 # -------------------------------------------------------------------------- other arguments
 
 REFUSED: list[tuple[str, dict[str, Any], str]] = [
-    ("sweep of a record", {"variables": []}, r"variables = \[\]: must name one of 'permanent_displacement'"),
+    (
+        "sweep of a record",
+        {"variables": []},
+        r"variables = \[\]: must name one of 'permanent_displacement'",
+    ),
     ("sweep", {"variables": 5}, "variables = 5: must be a list of names"),
     ("sweep", {"variables": [["validity"]]}, r"variables = \['validity'\]: must be one of"),
     ("sweep", {"theta": [1.0, 2.0], "chunks": 0}, "chunks = 0: "),
     ("sweep", {"theta": True}, "theta = True: must be a number"),
-    ("sweep", {"model": ["mendez"]}, r"model = \['mendez'\]: must be one of 'mendez', 'newmark', or Mendez\(...\)"),
+    (
+        "sweep",
+        {"model": ["mendez"]},
+        r"model = \['mendez'\]: must be one of 'mendez', 'newmark', or Mendez\(...\)",
+    ),
     ("sweep", {"solver": np.zeros(3)}, r"solver = array\(\[0., 0., 0.\]\): must be one of"),
     ("sweep", {"excitation": "harmonics"}, "amplitudes: must be given with waveform = 'harmonics'"),
     ("sweep", {"excitation": slipsweep.Sine}, "excitation = <class .*>: must be one of 'sine'"),
@@ -108,16 +123,28 @@ REFUSED: list[tuple[str, dict[str, Any], str]] = [
     ("sweep", {"progress": 3}, "progress = 3: must be a function"),
     ("sample", {"thresholds": None}, "thresholds = "),
     ("sample", {"correlation": 5}, "correlation = 5: must be a list"),
-    ("sample", {"correlation": [["mu_s", ["theta"], 0.1]]}, r"correlation = \['theta'\]: must be one of"),
+    (
+        "sample",
+        {"correlation": [["mu_s", ["theta"], 0.1]]},
+        r"correlation = \['theta'\]: must be one of",
+    ),
     ("sweep of a record", {"polarity": {1}}, r"polarity = \{1\}: must be 1, -1"),
     # names that no dataset can have
-    ("sweep", {"theta": xr.DataArray([1.0, 2.0], dims="mu_s")}, "mu_s: is a dimension of another parameter"),
+    (
+        "sweep",
+        {"theta": xr.DataArray([1.0, 2.0], dims="mu_s")},
+        "mu_s: is a dimension of another parameter",
+    ),
     (
         "sweep",
         {"theta": xr.DataArray([1.0], dims="case"), "mu_s": xr.DataArray(0.4, coords={"case": 1})},
         "mu_s: its coordinate 'case' has the name of a dimension",
     ),
-    ("sweep", {"theta": xr.Variable(("x", "x"), np.ones((2, 2)))}, "theta: dimensions x, x: must be named each once"),
+    (
+        "sweep",
+        {"theta": xr.Variable(("x", "x"), np.ones((2, 2)))},
+        "theta: dimensions x, x: must be named each once",
+    ),
 ]
 
 
@@ -135,7 +162,9 @@ def test_long_values_are_cut_short() -> None:
     assert "\n" not in str(raised.value)
 
 
-@pytest.mark.parametrize("number", [np.float32(0.5), np.array(0.5), Decimal("0.5"), Fraction(1, 2), xr.DataArray(0.5)])
+@pytest.mark.parametrize(
+    "number", [np.float32(0.5), np.array(0.5), Decimal("0.5"), Fraction(1, 2), xr.DataArray(0.5)]
+)
 def test_numbers_of_other_types(number: Any) -> None:
     assert slipsweep.Sine(ramp_in=number) == slipsweep.Sine(ramp_in=0.5)
     for function, name in [
@@ -146,7 +175,8 @@ def test_numbers_of_other_types(number: Any) -> None:
         xr.testing.assert_identical(call(function, **{name: number}), call(function, **{name: 0.5}))
 
 
-# ----------------------------------------------------------------- units, friction angle, long texts
+# ----------------------------------------------------------------- units, friction angle, long
+# texts
 
 
 def test_a_friction_angle_is_its_tangent_along_its_own_dimension() -> None:
@@ -183,7 +213,10 @@ def test_what_brings_a_unit_is_converted() -> None:
         ("displacement", 50.0 * unit.mm, 0.05),
     ):
         np.testing.assert_allclose(check_values(name, given), expected, rtol=1e-14)
-    for name, given in (("amplitude", 3.0 * unit.gram), ("mu_s", xr.DataArray(30.0, attrs={"units": "%"}))):
+    for name, given in (
+        ("amplitude", 3.0 * unit.gram),
+        ("mu_s", xr.DataArray(30.0, attrs={"units": "%"})),
+    ):
         with pytest.raises(InputError, match=f"{name}: units = .* must be a unit that converts to"):
             check_values(name, given)
 

@@ -9,8 +9,18 @@ import xarray as xr
 import slipsweep
 from slipsweep import Validity
 
-STICK_SLIP: dict[str, Any] = {"theta": 5.0, "mu_s": 0.38, "amplitude": 3.55, "yield_acceleration": 0.59}
-CONTINUOUS: dict[str, Any] = {"theta": 6.0, "mu_s": 0.38, "amplitude": 5.10, "yield_acceleration": 0.08}
+STICK_SLIP: dict[str, Any] = {
+    "theta": 5.0,
+    "mu_s": 0.38,
+    "amplitude": 3.55,
+    "yield_acceleration": 0.59,
+}
+CONTINUOUS: dict[str, Any] = {
+    "theta": 6.0,
+    "mu_s": 0.38,
+    "amplitude": 5.10,
+    "yield_acceleration": 0.08,
+}
 
 #: lambda as Table 2 prints it.
 PRINTED_DECAY = {"stick_slip": 2.70, "continuous": 2.30}
@@ -29,24 +39,40 @@ def printed(value: xr.DataArray, digits: int = 2) -> str:
     ids=["stick_slip", "continuous"],
 )
 def test_tables_1_and_2(
-    experiment: dict[str, Any], limit: str, ratio: str, mode: int, above_static: str, least: str, decay: str
+    experiment: dict[str, Any],
+    limit: str,
+    ratio: str,
+    mode: int,
+    above_static: str,
+    least: str,
+    decay: str,
 ) -> None:
     """But for lambda: Eq. 6 at the peak does not give that of Table 2, and no formula is bent to hide it."""
     parameters = slipsweep.friction_parameters(**experiment, model=slipsweep.Mendez(g=9.81))
-    assert printed(parameters.limiting_acceleration) == limit, "Eq. 7: limiting acceleration, Table 1"
+    assert printed(parameters.limiting_acceleration) == limit, (
+        "Eq. 7: limiting acceleration, Table 1"
+    )
     assert printed(parameters.acceleration_ratio) == ratio, "acceleration ratio, Table 1"
     assert int(parameters.sliding_mode) == mode, "sliding mode, Table 1"
-    assert printed(parameters.delta_mu) == above_static, "Eqs. 10 and 11: friction above static, Table 2"
+    assert printed(parameters.delta_mu) == above_static, (
+        "Eqs. 10 and 11: friction above static, Table 2"
+    )
     assert printed(parameters.minimum_friction) == least, "Eq. 9: minimum friction, Table 2"
     assert mode == 1 or float(parameters.minimum_friction) == 0.01, "continuous: next to zero"
     assert printed(parameters.decay_rate) == decay, "lambda by Eq. 6"
-    peak = (experiment["mu_s"] + parameters.delta_mu) * np.exp(-parameters.decay_rate * experiment["amplitude"] / 9.81)
-    assert float(peak) == pytest.approx(float(parameters.minimum_friction), rel=1e-13), "Eq. 6 at the peak"
+    peak = (experiment["mu_s"] + parameters.delta_mu) * np.exp(
+        -parameters.decay_rate * experiment["amplitude"] / 9.81
+    )
+    assert float(peak) == pytest.approx(float(parameters.minimum_friction), rel=1e-13), (
+        "Eq. 6 at the peak"
+    )
 
 
 def test_attenuation_coefficient_with_the_printed_decay_rate() -> None:
     """Kd = max(U)/g of the stick-slip experiment; Table 3 prints 0.17."""
-    history = slipsweep.simulate(**STICK_SLIP, frequency=1.8, decay_rate=2.70, excitation=slipsweep.Sine(cycles=1))
+    history = slipsweep.simulate(
+        **STICK_SLIP, frequency=1.8, decay_rate=2.70, excitation=slipsweep.Sine(cycles=1)
+    )
     attenuation = history.block_acceleration.max() / 9.81
     assert printed(attenuation, 3) == "0.157", "Eq. 12: Kd with lambda 2.70"
 
@@ -54,11 +80,19 @@ def test_attenuation_coefficient_with_the_printed_decay_rate() -> None:
 @pytest.mark.parametrize("solver", ["cycle", "step"])
 @pytest.mark.parametrize(
     ("experiment", "mode", "frequency", "displacement", "velocity"),
-    [(STICK_SLIP, "stick_slip", 1.8, "331", "0.295"), (CONTINUOUS, "continuous", 3.5, "159", "0.224")],
+    [
+        (STICK_SLIP, "stick_slip", 1.8, "331", "0.295"),
+        (CONTINUOUS, "continuous", 3.5, "159", "0.224"),
+    ],
     ids=["stick_slip", "continuous"],
 )
 def test_figures_with_the_printed_decay_rate(
-    experiment: dict[str, Any], mode: str, frequency: float, displacement: str, velocity: str, solver: str
+    experiment: dict[str, Any],
+    mode: str,
+    frequency: float,
+    displacement: str,
+    velocity: str,
+    solver: str,
 ) -> None:
     """Five cycles of a pure sine; delta_mu by Eqs. 10 and 11."""
     result = slipsweep.sweep(
@@ -78,7 +112,14 @@ def test_figures_with_the_printed_decay_rate(
     [
         (STICK_SLIP, 1.8, {"yield_acceleration": None}, "31.0", "31.0", Validity.YIELD_GOVERNS),
         (CONTINUOUS, 3.5, {"yield_acceleration": None}, "68.9", "64.3", Validity.YIELD_GOVERNS),
-        (STICK_SLIP, 1.8, {}, "1858.7", "548.7", Validity.NOT_RECOUPLED | Validity.FRICTION_ESTIMATED),
+        (
+            STICK_SLIP,
+            1.8,
+            {},
+            "1858.7",
+            "548.7",
+            Validity.NOT_RECOUPLED | Validity.FRICTION_ESTIMATED,
+        ),
         (CONTINUOUS, 3.5, {}, "377.0", "316.5", Validity.FRICTION_ESTIMATED),
         (STICK_SLIP, 1.8, {"decay_rate": 2.70}, "331.0", "548.7", Validity.FRICTION_ESTIMATED),
         (CONTINUOUS, 3.5, {"decay_rate": 2.30}, "159.1", "316.5", Validity.FRICTION_ESTIMATED),

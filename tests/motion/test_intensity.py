@@ -32,8 +32,11 @@ def resampled(record: Record, parts: int) -> Record:
 
 
 def test_a_sine() -> None:
-    amplitude, frequency, cycles = 3.0, 2.0, 40
-    duration, omega = cycles / frequency, 2.0 * math.pi * frequency
+    amplitude = 3.0
+    frequency = 2.0
+    cycles = 40
+    duration = cycles / frequency
+    omega = 2.0 * math.pi * frequency
     times = np.arange(cycles * 2000 + 1) / (2000 * frequency)
     found = measures(times, amplitude * np.sin(omega * times))
     expected = {
@@ -47,7 +50,9 @@ def test_a_sine() -> None:
         "mean_period": 1.0 / frequency,
     }
     for name, value in expected.items():
-        assert found[name] == pytest.approx(value, rel=2e-6 if name != "mean_period" else 2e-3), name
+        assert found[name] == pytest.approx(value, rel=2e-6 if name != "mean_period" else 2e-3), (
+            name
+        )
 
 
 def test_straight_lines_by_hand() -> None:
@@ -60,7 +65,9 @@ def test_straight_lines_by_hand() -> None:
     assert found["arias_intensity"] == pytest.approx(math.pi / (2.0 * G) * 1.0, rel=1e-15)
     assert found["cav"] == pytest.approx(0.5 + 1.0, rel=1e-15)
     # of ∫ = 1: t³/3 = 0.05, and symmetrically at the end
-    assert found["significant_duration"] == pytest.approx(3.0 - 0.15 ** (1 / 3) - (1.0 - 0.85 ** (1 / 3)), rel=1e-14)
+    assert found["significant_duration"] == pytest.approx(
+        3.0 - 0.15 ** (1 / 3) - (1.0 - 0.85 ** (1 / 3)), rel=1e-14
+    )
 
 
 def test_the_mean_period_is_that_of_frequencies_up_to_20_hz() -> None:
@@ -82,7 +89,9 @@ def test_a_constant_acceleration() -> None:
 @given(st.integers(0, 10**6), st.integers(2, 7))
 def test_more_samples_on_the_same_lines_change_nothing(seed: int, parts: int) -> None:
     record = noise(seed)
-    one, other = (measures(each.times, each.acceleration) for each in (record, resampled(record, parts)))
+    one, other = (
+        measures(each.times, each.acceleration) for each in (record, resampled(record, parts))
+    )
     del one["mean_period"]  # which the definition has of the samples
     for name, value in one.items():
         assert other[name] == pytest.approx(value, rel=1e-11), name
@@ -98,7 +107,9 @@ def test_a_strength_is_that_of_the_motion_that_shakes(strength: str, time_scale:
     if strength == "scale":
         assert factor == 0.7
     else:
-        assert shaken["pga" if strength == "amplitude" else strength] == pytest.approx(0.7, rel=1e-13)
+        assert shaken["pga" if strength == "amplitude" else strength] == pytest.approx(
+            0.7, rel=1e-13
+        )
 
 
 def test_motions_without_a_measure() -> None:
@@ -111,7 +122,8 @@ def test_motions_without_a_measure() -> None:
 
 def test_as_eqsig_has_them() -> None:
     """On the motions that pySLAMMER ships; eqsig's trapezoids have the straight lines sampled 16 times as finely."""
-    eqsig, pyslammer = pytest.importorskip("eqsig"), pytest.importorskip("pyslammer")
+    eqsig = pytest.importorskip("eqsig")
+    pyslammer = pytest.importorskip("pyslammer")
     for name, motion in pyslammer.sample_ground_motions().items():
         record = Record.sampled(np.asarray(motion.accel) * G, motion.dt)
         fine = resampled(record, 16)

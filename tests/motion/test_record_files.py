@@ -13,7 +13,8 @@ from slipsweep import InputError, Record, read_record, read_suite
 
 AT2 = "PEER STRONG MOTION DATABASE RECORD\nA PLACE, 1/1/2000\nACCELERATION TIME HISTORY IN UNITS OF G\n"
 
-#: Typed in after the description of the format: 2^23 counts are 2000 gal, at 100 samples a second for 0.05 s.
+#: Typed in after the description of the format: 2^23 counts are 2000 gal, at 100 samples a second
+#: for 0.05 s.
 KNET = """Origin Time       2000/01/01 12:00:00
 Lat.              35.0
 Station Code      XYZ001
@@ -27,8 +28,9 @@ Memo.
    41943     -4194
 """
 
-#: A file as the format's description has it (Ver. 1.20, 2001), typed in, not made by any code of ours: 13 lines
-#: of text, headers with 999s for what is unknown, values in columns with no blanks between them.
+#: A file as the format's description has it (Ver. 1.20, 2001), typed in, not made by any code of
+#: ours: 13 lines of text, headers with 999s for what is unknown, values in columns with no blanks
+#: between them.
 V1 = Path(__file__).parents[1] / "data" / "cosmos.V1"
 
 
@@ -66,7 +68,9 @@ def test_accelerations_alone_with_their_interval(tmp_path: Path, text: str) -> N
     """As SLAMMER has them: numbers between blanks, commas or lines."""
     record = read_record(write(tmp_path, "a.txt", text), units="g", interval=0.005)
     np.testing.assert_allclose(record.times, [0.0, 0.005, 0.01], rtol=1e-15)
-    np.testing.assert_allclose(record.acceleration, 9.80665 * np.array([0.1, -0.2, 0.3]), rtol=1e-15)
+    np.testing.assert_allclose(
+        record.acceleration, 9.80665 * np.array([0.1, -0.2, 0.3]), rtol=1e-15
+    )
 
 
 def test_knet(tmp_path: Path) -> None:
@@ -94,21 +98,53 @@ def test_baseline() -> None:
         ("a.csv", "t,a (g)\n0,1\n1,2\n", {"units": "gal"}, "the file itself says 'g'; correct it"),
         ("a.csv", "0,1\n1,x\n", {"units": "g"}, "line 2: '1,x'"),
         ("a.csv", "0,1\n1,\n", {"units": "g"}, "first at t = 1 s"),
-        ("a.csv", "0,1\n1,1\n1,2\n", {"units": "g"}, "time of sample 3 = 1: must be greater than 1"),
+        (
+            "a.csv",
+            "0,1\n1,1\n1,2\n",
+            {"units": "g"},
+            "time of sample 3 = 1: must be greater than 1",
+        ),
         ("a.csv", "no numbers\n", {"units": "g"}, "no line of a time and an acceleration"),
-        ("a.csv", "0,1\n1,2\n", {"units": "g", "channel": 1}, "channel = 1: only COSMOS files hold several"),
+        (
+            "a.csv",
+            "0,1\n1,2\n",
+            {"units": "g", "channel": 1},
+            "channel = 1: only COSMOS files hold several",
+        ),
         ("a.txt", "1\n2\n", {"units": "g"}, "interval: must be given"),
-        ("a.txt", "0,1\n0.1,2\n", {"units": "g", "interval": 0.1}, "the first of two columns is that of times"),
-        ("a.txt", "dt = 0.01\n1\n2\n", {"units": "g", "interval": 0.02}, "the file itself says 0.01"),
-        ("a.AT2", f"{AT2}NPTS= 3, DT= .005 SEC\n 1 2\n", {}, "2 accelerations, where its header says 3"),
+        (
+            "a.txt",
+            "0,1\n0.1,2\n",
+            {"units": "g", "interval": 0.1},
+            "the first of two columns is that of times",
+        ),
+        (
+            "a.txt",
+            "dt = 0.01\n1\n2\n",
+            {"units": "g", "interval": 0.02},
+            "the file itself says 0.01",
+        ),
+        (
+            "a.AT2",
+            f"{AT2}NPTS= 3, DT= .005 SEC\n 1 2\n",
+            {},
+            "2 accelerations, where its header says 3",
+        ),
         ("a.AT2", f"{AT2}NPTS= 3, DT= .005 SEC\n 1 2\n oops\n", {}, "line 6: ' oops'"),
         ("a.AT2", f"{AT2}NPTS= 3, DT= .005 SEC\n 1 2 1e999\n", {}, "sample 3 = inf"),
-        ("a.AT2", f"{AT2}NPTS= 2, DT= .005 SEC\n 1 2\n", {"interval": 0.01}, "only for a file without times"),
+        (
+            "a.AT2",
+            f"{AT2}NPTS= 2, DT= .005 SEC\n 1 2\n",
+            {"interval": 0.01},
+            "only for a file without times",
+        ),
         ("a.NS", KNET.replace("  -4194", ""), {}, "4 accelerations, where its header says 5"),
         ("a.AT2", f"{AT2}NPTS= many, DT= .005 SEC\n 1 2\n", {}, "no NPTS= in its header"),
     ],
 )
-def test_files_that_are_refused(tmp_path: Path, name: str, text: str, options: dict[str, Any], message: str) -> None:
+def test_files_that_are_refused(
+    tmp_path: Path, name: str, text: str, options: dict[str, Any], message: str
+) -> None:
     with pytest.raises(InputError, match=name.replace(".", "[.]")) as error:
         read_record(write(tmp_path, name, text), **options)
     assert message in str(error.value)
@@ -138,13 +174,43 @@ OUT = np.r_[:400, 600:1001]
 BOTH = {"gaps": "linear", "implausible": "accept"}
 WRONG: dict[str, tuple[Any, Any, dict[str, Any], str]] = {
     "gap": (TIMES[OUT], SHAKING[OUT], BOTH, "no samples from t = 3.99 to 6 s (201 times"),
-    "-999": (TIMES, changed(-999, 500), {"gaps": "linear"}, "1 fill value (-999), first at t = 5 s"),
-    "blank": (TIMES, changed(np.nan, 500), {"gaps": "linear"}, "1 fill value (blank), first at t = 5 s"),
-    "repeated": (TIMES, changed(-1e5, 500, 700), {"gaps": "linear"}, "2 fill values (-100000), first at t = 5 s"),
-    "held": (TIMES, changed(0.1, *range(500, 600)), BOTH, "the value 0.1 is held from t = 5 to 5.99 s"),
-    "peak": (TIMES, changed(4.0, 500), {"implausible": "accept"}, "peak acceleration 4 g at t = 5 s"),
+    "-999": (
+        TIMES,
+        changed(-999, 500),
+        {"gaps": "linear"},
+        "1 fill value (-999), first at t = 5 s",
+    ),
+    "blank": (
+        TIMES,
+        changed(np.nan, 500),
+        {"gaps": "linear"},
+        "1 fill value (blank), first at t = 5 s",
+    ),
+    "repeated": (
+        TIMES,
+        changed(-1e5, 500, 700),
+        {"gaps": "linear"},
+        "2 fill values (-100000), first at t = 5 s",
+    ),
+    "held": (
+        TIMES,
+        changed(0.1, *range(500, 600)),
+        BOTH,
+        "the value 0.1 is held from t = 5 to 5.99 s",
+    ),
+    "peak": (
+        TIMES,
+        changed(4.0, 500),
+        {"implausible": "accept"},
+        "peak acceleration 4 g at t = 5 s",
+    ),
     "unit": (TIMES, SHAKING * 980.665, {"implausible": "accept"}, "in cm/s2 it would be 0.299 g"),
-    "weak": (TIMES, SHAKING / 980.665, {"implausible": "accept"}, "below 0.001 g, check units and header"),
+    "weak": (
+        TIMES,
+        SHAKING / 980.665,
+        {"implausible": "accept"},
+        "below 0.001 g, check units and header",
+    ),
     "drift": (TIMES, SHAKING + 0.02, {"implausible": "accept"}, "the ground moves 9.79 m"),
 }
 
@@ -173,7 +239,11 @@ def test_missing_samples_are_interpolated_and_drifts_taken_off(tmp_path: Path) -
     drifting = motion(tmp_path, TIMES, SHAKING + 0.02)
     assert "record_accepted" not in read_record(drifting, units="g", baseline="linear").attrs
     with pytest.raises(InputError, match="the ground moves 9"):  # a gap excuses no drift
-        read_record(motion(tmp_path, TIMES, np.where(TIMES == 5.0, -999, SHAKING + 0.02)), units="g", gaps="linear")
+        read_record(
+            motion(tmp_path, TIMES, np.where(TIMES == 5.0, -999, SHAKING + 0.02)),
+            units="g",
+            gaps="linear",
+        )
 
 
 def test_peaks_of_999_gal_are_no_fill_values(tmp_path: Path) -> None:
@@ -200,12 +270,20 @@ def test_a_trace_of_obspy() -> None:
     np.testing.assert_allclose(record.acceleration, 0.3 * SHAKING, rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(record.times, TIMES, rtol=1e-15)
     assert (record.name, record.attrs["record_units"]) == ("XX.ABC..HNE", "cm/s2")
-    assert abs(Record.from_obspy(trace(SHAKING + 0.01), "m/s2", baseline="mean").acceleration.mean()) < 1e-12
+    assert (
+        abs(Record.from_obspy(trace(SHAKING + 0.01), "m/s2", baseline="mean").acceleration.mean())
+        < 1e-12
+    )
     masked = np.ma.masked_array(SHAKING, np.arange(1001) == 500)
-    with pytest.raises(InputError, match=r"XX\.ABC\.\.HNE: 1 fill value \(blank\), first at t = 5 s"):
+    with pytest.raises(
+        InputError, match=r"XX\.ABC\.\.HNE: 1 fill value \(blank\), first at t = 5 s"
+    ):
         Record.from_obspy(trace(masked), "m/s2")
     assert Record.from_obspy(trace(masked), "m/s2", gaps="linear").times.size == 1000
-    for none, message in ((trace(np.arange(5)), "whole numbers, counts of a digitizer"), ([1.0], "must be a Trace of")):
+    for none, message in (
+        (trace(np.arange(5)), "whole numbers, counts of a digitizer"),
+        ([1.0], "must be a Trace of"),
+    ):
         with pytest.raises(InputError, match=message):
             Record.from_obspy(none, "m/s2")
 
@@ -216,7 +294,18 @@ def test_a_trace_of_obspy() -> None:
 def test_cosmos_by_its_columns() -> None:
     """Eight values to a line in columns of ten, cm/s², at 200 samples a second; the last ones touch."""
     record = read_record(V1)
-    expected = [0.03630, -0.03632, 1.5, -20.25, 98.0665, -980.665, 12.00001, -0.5, -234.56789, -100.00001]
+    expected = [
+        0.03630,
+        -0.03632,
+        1.5,
+        -20.25,
+        98.0665,
+        -980.665,
+        12.00001,
+        -0.5,
+        -234.56789,
+        -100.00001,
+    ]
     np.testing.assert_allclose(record.acceleration, 0.01 * np.array(expected), rtol=1e-15)
     np.testing.assert_allclose(record.times, 0.005 * np.arange(10), rtol=1e-15)
     assert (record.attrs["record_format"], record.attrs["record_units"]) == ("cosmos", "cm/s2")
@@ -230,17 +319,25 @@ def test_cosmos_with_several_channels(tmp_path: Path) -> None:
     other = first.replace("   0.03630", "  77.00000")
     velocity = first.replace("       1       1       4     120", "       2       2       5     120")
     path = write(tmp_path, "three.V2", first[:end] + pts + first[end:] + velocity + other)
-    with pytest.raises(InputError, match="channel = None: must be one of its 2 channels of acceleration"):
+    with pytest.raises(
+        InputError, match="channel = None: must be one of its 2 channels of acceleration"
+    ):
         read_record(path)
     found = [read_record(path, channel=number) for number in (1, 2)]
-    assert [float(record.acceleration[0]) for record in found] == pytest.approx([0.000363, 0.77], rel=1e-15)
+    assert [float(record.acceleration[0]) for record in found] == pytest.approx(
+        [0.000363, 0.77], rel=1e-15
+    )
     assert found[1].attrs["record_channel"] == "2"
 
 
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("       1       1       4     120", "       0       1      50     120", "code 50 for the unit"),
+        (
+            "       1       1       4     120",
+            "       0       1      50     120",
+            "code 50 for the unit",
+        ),
         (
             "       1       1       4     120",
             "       1       2       5     120",

@@ -16,12 +16,16 @@ HEADER = "time (s),acceleration (m/s2)\n"
 
 def write(path: Path, values: Any = (0.0, 1.0, -2.0, 0.5), interval: float = 0.1) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(HEADER + "".join(f"{at * interval:.6g},{value:.6g}\n" for at, value in enumerate(values)))
+    path.write_text(
+        HEADER + "".join(f"{at * interval:.6g},{value:.6g}\n" for at, value in enumerate(values))
+    )
     return path
 
 
 def noise(seed: int, count: int = 50, interval: float = 0.01) -> Record:
-    return Record.sampled(np.random.default_rng(seed).normal(size=count), interval, f"noise{seed}.csv")
+    return Record.sampled(
+        np.random.default_rng(seed).normal(size=count), interval, f"noise{seed}.csv"
+    )
 
 
 @pytest.fixture
@@ -44,14 +48,18 @@ def test_a_folder_a_pattern_and_a_list_are_one_suite(folder: Path) -> None:
         assert suite.labels == ("a", "b", "c")
         assert suite.motions == suites[0].motions
         assert [motion.times.size for motion in suite] == [5, 6, 4]
-    np.testing.assert_array_equal(suites[0]["b"].acceleration, read_record(folder / "b.csv").acceleration)
+    np.testing.assert_array_equal(
+        suites[0]["b"].acceleration, read_record(folder / "b.csv").acceleration
+    )
 
 
 def test_all_damaged_files_are_named_at_once(folder: Path) -> None:
     (folder / "damaged.AT2").write_text("NPTS= 3, DT= 0.01\n1 2\n")
     (folder / "notes.txt").write_text("what is in this folder\n")
     (folder / "b.csv").write_text(f"{HEADER}0,1\n0.1,zero\n")
-    with pytest.raises(InputError, match=r"^3 of 5 files cannot be read: b\.csv, damaged\.AT2, notes\.txt") as caught:
+    with pytest.raises(
+        InputError, match=r"^3 of 5 files cannot be read: b\.csv, damaged\.AT2, notes\.txt"
+    ) as caught:
         read_suite(folder)
     b, damaged, notes = caught.value.__notes__
     assert b == f"{folder / 'b.csv'}: line 3: '0.1,zero': must be a time and an acceleration"
@@ -60,13 +68,21 @@ def test_all_damaged_files_are_named_at_once(folder: Path) -> None:
 
 
 def test_stems_that_are_alike_are_told_apart(tmp_path: Path) -> None:
-    paths = [write(tmp_path / name) for name in ("x/a.csv", "y/a.csv", "y/b.csv", "y/b.txt", "c.csv")]
+    paths = [
+        write(tmp_path / name) for name in ("x/a.csv", "y/a.csv", "y/b.csv", "y/b.txt", "c.csv")
+    ]
     assert read_suite(paths).labels == ("x/a.csv", "y/a.csv", "y/b.csv", "y/b.txt", "c")
-    assert Suite((noise(1), noise(1), noise(2))).labels == ("noise1.csv", "noise1.csv (2)", "noise2")
+    assert Suite((noise(1), noise(1), noise(2))).labels == (
+        "noise1.csv",
+        "noise1.csv (2)",
+        "noise2",
+    )
 
 
 def test_motions_that_are_the_same_are_told(folder: Path) -> None:
-    (folder / "d.csv").write_text((folder / "b.csv").read_text() + "\n")  # another file, the same motion
+    (folder / "d.csv").write_text(
+        (folder / "b.csv").read_text() + "\n"
+    )  # another file, the same motion
     suite = read_suite(folder)
     assert suite.attrs["duplicate_motions"] == "b, d"
     assert "duplicate_motions" not in suite[["a", "b"]].attrs
@@ -111,7 +127,9 @@ def test_measures_along_the_motions(folder: Path) -> None:
 def test_what_is_no_suite(motions: Any, labels: Any, words: str) -> None:
     with pytest.raises(InputError, match=words):
         Suite(motions, labels)
-    with pytest.raises(InputError, match=r"motion = 'noise3': not in the suite; did you mean \"noise"):
+    with pytest.raises(
+        InputError, match=r"motion = 'noise3': not in the suite; did you mean \"noise"
+    ):
         Suite((noise(1), noise(2)))["noise3"]
 
 
@@ -127,7 +145,9 @@ def test_what_is_no_suite(motions: Any, labels: Any, words: str) -> None:
         ("\0", "cannot be read"),
     ],
 )
-def test_paths_that_name_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, paths: Any, words: str) -> None:
+def test_paths_that_name_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, paths: Any, words: str
+) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match=words):
@@ -138,22 +158,36 @@ def test_paths_that_name_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_rotation_is_exact_at_the_quarters_and_straight_between_samples() -> None:
-    first, second = noise(1), noise(2)
+    first = noise(1)
+    second = noise(2)
     pair = Pair(first, second)
-    for quarter, sign, one in ((0, 1, first), (1, 1, second), (2, -1, first), (3, -1, second), (4, 1, first)):
-        np.testing.assert_array_equal(pair.rotated(90.0 * quarter).acceleration, sign * one.acceleration)
+    for quarter, sign, one in (
+        (0, 1, first),
+        (1, 1, second),
+        (2, -1, first),
+        (3, -1, second),
+        (4, 1, first),
+    ):
+        np.testing.assert_array_equal(
+            pair.rotated(90.0 * quarter).acceleration, sign * one.acceleration
+        )
     # what stands at right angles has the rest of the energy
     whole = sum(arias_intensity(one.times, one.acceleration) for one in (first, second))
     for azimuth in (10.0, 33.3, 77.0):
         both = (pair.rotated(azimuth), pair.rotated(azimuth + 90.0))
-        assert sum(arias_intensity(one.times, one.acceleration) for one in both) == pytest.approx(whole, rel=1e-13)
+        assert sum(arias_intensity(one.times, one.acceleration) for one in both) == pytest.approx(
+            whole, rel=1e-13
+        )
         assert both[0] == Pair(first, second).rotated(azimuth)
 
 
 def test_the_shorter_component_is_continued_with_zeros() -> None:
-    first, second = noise(1, 50), noise(2, 40)
+    first = noise(1, 50)
+    second = noise(2, 40)
     pair = Pair(first, second)
-    np.testing.assert_array_equal(pair.rotated(90.0).acceleration, [*second.acceleration, *np.zeros(10)])
+    np.testing.assert_array_equal(
+        pair.rotated(90.0).acceleration, [*second.acceleration, *np.zeros(10)]
+    )
     np.testing.assert_array_equal(Pair(second, first).rotated(90.0).times, first.times)
     with pytest.raises(InputError, match=r"noise1\.csv, noise2\.csv: .* sampled at the same times"):
         Pair(first, noise(2, 50, 0.02))
@@ -161,17 +195,29 @@ def test_the_shorter_component_is_continued_with_zeros() -> None:
 
 def test_pairs_by_the_endings_of_their_names(tmp_path: Path) -> None:
     for name in ("one_NS", "one_EW", "two_NS", "two_EW"):
-        write(tmp_path / f"{name}.csv", np.random.default_rng(len(name)).normal(size=5) + ("two" in name))
+        write(
+            tmp_path / f"{name}.csv",
+            np.random.default_rng(len(name)).normal(size=5) + ("two" in name),
+        )
     suite = read_suite(tmp_path, pairs=("_NS", "_EW"))
     assert suite.labels == ("one", "two")
     assert suite.has_pairs
-    assert suite["two"] == Pair(read_record(tmp_path / "two_NS.csv"), read_record(tmp_path / "two_EW.csv"))
-    listed = read_suite([[tmp_path / f"{name}_NS.csv", tmp_path / f"{name}_EW.csv"] for name in ("one", "two")])
+    assert suite["two"] == Pair(
+        read_record(tmp_path / "two_NS.csv"), read_record(tmp_path / "two_EW.csv")
+    )
+    listed = read_suite(
+        [[tmp_path / f"{name}_NS.csv", tmp_path / f"{name}_EW.csv"] for name in ("one", "two")]
+    )
     assert listed.motions == suite.motions
-    assert suite.measures["motion_file"].tolist() == ["one_NS.csv one_EW.csv", "two_NS.csv two_EW.csv"]
+    assert suite.measures["motion_file"].tolist() == [
+        "one_NS.csv one_EW.csv",
+        "two_NS.csv two_EW.csv",
+    ]
     write(tmp_path / "three_NS.csv")
     write(tmp_path / "vertical.csv")
-    with pytest.raises(InputError, match=r"without the other component: three_NS\.csv, vertical\.csv"):
+    with pytest.raises(
+        InputError, match=r"without the other component: three_NS\.csv, vertical\.csv"
+    ):
         read_suite(tmp_path, pairs=("_NS", "_EW"))
     for pairs in ("_NS", ("_NS",), ("_NS", ""), ("_NS", "_NS"), (1, 2)):
         with pytest.raises(InputError, match=r"^pairs = "):

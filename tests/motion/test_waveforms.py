@@ -37,9 +37,12 @@ def exact(waveform: Waveform, phase: np.ndarray) -> np.ndarray:
     if isinstance(waveform, Harmonics) and waveform.phases:
         columns = zip(waveform.amplitudes, waveform.multiples, waveform.phases, strict=True)
         terms = ",".join(f"{a!r}:{m}:{p!r}" for a, m, p in columns)
-    reference = sections.Waveform(waveform.name, terms, waveform.cycles, waveform.ramp_in, waveform.ramp_out)
+    reference = sections.Waveform(
+        waveform.name, terms, waveform.cycles, waveform.ramp_in, waveform.ramp_out
+    )
     with workdps(30):
-        numbers, values = (phase // (2 * pi)).astype(int).tolist(), []
+        numbers = (phase // (2 * pi)).astype(int).tolist()
+        values = []
         cycles = {n: list(reference.sections(n, mpfr(1))) for n in {*numbers}}
         for n, phi in zip(numbers, phase.tolist(), strict=True):
             own = phi - 2 * gmpy2.const_pi() * n
@@ -85,7 +88,8 @@ def test_peak_is_exact(seed: int) -> None:
     draw = np.random.default_rng(seed)
     count = int(draw.integers(2, 7))
     multiples = draw.choice(np.arange(1, 51), count, replace=False)
-    amplitudes, phases = draw.normal(size=count).tolist(), draw.uniform(0, 360, count).tolist()
+    amplitudes = draw.normal(size=count).tolist()
+    phases = draw.uniform(0, 360, count).tolist()
     waveform = Harmonics(amplitudes, multiples.tolist(), phases, cycles=1)
     pieces = wave_of(waveform).pieces
     assert np.abs(pieces["top"]).max() == 1.0
@@ -94,14 +98,16 @@ def test_peak_is_exact(seed: int) -> None:
     assert np.abs(exact(waveform, np.array([phase]))) == pytest.approx(1.0, rel=1e-13)
 
 
-#: sin 2φ and sin 3φ that nearly cancel about φ = π: three zeros within 0.026 rad, the wave below 1e-5 between them.
+#: sin 2φ and sin 3φ that nearly cancel about φ = π: three zeros within 0.026 rad, the wave below
+#: 1e-5 between them.
 THREE_ZEROS = Harmonics([0.2536777542789753, 0.1692128468453051], [2, 3], cycles=12)
 
 
 @pytest.mark.parametrize("power", range(1, 6))
 def test_zeros_that_lie_close_together_are_told_apart(power: int) -> None:
     """a sin 2φ + b sin 3φ = sin φ (2a cos φ + b (4 cos² φ − 1)) in closed form, about π at distances 10⁻¹ to 10⁻⁵."""
-    a, b = 1.0, 2 / 3 * (1 + 10.0 ** (-2 * power))
+    a = 1.0
+    b = 2 / 3 * (1 + 10.0 ** (-2 * power))
     ends = wave_of(Harmonics([a, b], [2, 3], cycles=1)).pieces
     found = ends["start"][ends["first"] == 0.0]
     # 4b x² + 2a x − b = 0 in x = cos φ; the root near −1 as a distance from it
@@ -113,7 +119,12 @@ def test_zeros_that_lie_close_together_are_told_apart(power: int) -> None:
 
 def test_friction_turns_at_each_zero() -> None:
     """Continuous sliding over three close zeros, against Gauss's rule between them; all solvers share the pieces."""
-    theta, mu_s, amplitude, frequency, onset, decay = 0.0, 0.33292316, 8.9043785, 1.3944814, 1.8758496, 31.182287
+    theta = 0.0
+    mu_s = 0.33292316
+    amplitude = 8.9043785
+    frequency = 1.3944814
+    onset = 1.8758496
+    decay = 31.182287
     g = 9.81
     at_rest = mu_s * amplitude / (onset + g * mu_s)  # Eqs. 7, 8 and 10 on the level plane
     a, b = THREE_ZEROS.amplitudes
@@ -126,11 +137,16 @@ def test_friction_turns_at_each_zero() -> None:
         ground = shaking(phase)
         return np.sign(ground) * g * (mu_s - at_rest * np.exp(-decay * np.abs(ground) / g))
 
-    low, high = 0.0, 0.1
+    low = 0.0
+    high = 0.1
     for _ in range(60):
         middle = (low + high) / 2
         low, high = (middle, high) if shaking(np.array(middle)) < onset else (low, middle)
-    zeros = [0.0, *(pi + side * distance for side, distance in ((-1, 1.82356298072), (-1, 0.02586596335))), pi]
+    zeros = [
+        0.0,
+        *(pi + side * distance for side, distance in ((-1, 1.82356298072), (-1, 0.02586596335))),
+        pi,
+    ]
     zeros += [2 * pi - zero for zero in zeros[-2::-1]]
     assert np.abs(shaking(np.array(zeros))).max() < 1e-9
     points, weights = np.polynomial.legendre.leggauss(40)
@@ -138,15 +154,22 @@ def test_friction_turns_at_each_zero() -> None:
     for cycle in range(12):
         for start, end in itertools.pairwise(zeros):
             edges = np.linspace(max(start, high) if cycle == 0 else start, end, 41)
-            half, centre = np.diff(edges)[:, None] / 2, (edges[1:] + edges[:-1])[:, None] / 2
+            half = np.diff(edges)[:, None] / 2
+            centre = (edges[1:] + edges[:-1])[:, None] / 2
             phase = centre + half * points
             moved += float((half * weights * rate(phase) * (2 * pi * (12 - cycle) - phase)).sum())
     expected = moved / (2 * pi * frequency) ** 2
     for solver in (Cycle(), Step(rule="simpson", steps_per_cycle=1024)):
         found = sweep(
-            theta, mu_s, amplitude, frequency, yield_acceleration=onset, decay_rate=decay, excitation=THREE_ZEROS,
+            theta,
+            mu_s,
+            amplitude,
+            frequency,
+            yield_acceleration=onset,
+            decay_rate=decay,
+            excitation=THREE_ZEROS,
             solver=solver,
-        )  # fmt: skip
+        )
         assert float(found.permanent_displacement) == pytest.approx(expected, rel=1e-7)
 
 

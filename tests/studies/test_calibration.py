@@ -15,16 +15,26 @@ from slipsweep.studies.calibration import sweep_file_text
 from slipsweep.studies.estimate import SQUARE, Search
 from tests.support.shaking import CALIBRATED, SOUGHT, coulomb, exact, measured
 
-#: The issue's case: with this motion of 3.2 m/s² Üy holds the block, or Eq. 4 crosses at the same value.
+#: The issue's case: with this motion of 3.2 m/s² Üy holds the block, or Eq. 4 crosses at the same
+#: value.
 BRANCHES: dict[str, Any] = {
-    "theta": 5.0, "mu_s": 0.38, "amplitude": 3.2, "frequency": 2.0,
-    "yield_acceleration": 1.3, "decay_rate": 4.0, "delta_mu": 0.1, "excitation": slipsweep.Sine(cycles=6),
-}  # fmt: skip
+    "theta": 5.0,
+    "mu_s": 0.38,
+    "amplitude": 3.2,
+    "frequency": 2.0,
+    "yield_acceleration": 1.3,
+    "decay_rate": 4.0,
+    "delta_mu": 0.1,
+    "excitation": slipsweep.Sine(cycles=6),
+}
 
 
 @pytest.fixture(scope="module")
 def clean() -> dict[str, xr.Dataset]:
-    return {name: exact(case, tail=0.5 if name == "stick_slip" else 0.0) for name, case in CALIBRATED.items()}
+    return {
+        name: exact(case, tail=0.5 if name == "stick_slip" else 0.0)
+        for name, case in CALIBRATED.items()
+    }
 
 
 def calibrated(test: Any, mode: str = "stick_slip", **options: Any) -> xr.Dataset:
@@ -36,7 +46,8 @@ def check_intervals(found: xr.Dataset, case: dict[str, Any], wider: float = 1.8)
     """The true values lie within the intervals made wider: for a seed that is written down, no matter of chance."""
     for name in SOUGHT:
         low, high = found[f"{name}_interval"].values
-        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+        middle = 0.5 * (low + high)
+        half = 0.5 * (high - low)
         if np.isfinite(high):
             assert abs(case[name] - middle) < wider * half, name
         else:
@@ -52,7 +63,8 @@ def test_without_noise_the_parameters_come_back(clean: dict[str, xr.Dataset], mo
 
 @pytest.mark.parametrize("mode", CALIBRATED)
 def test_noise_digitisation_and_cycles(clean: dict[str, xr.Dataset], mode: str) -> None:
-    found, case = calibrated(measured(clean[mode], seed=1), mode, cycles=True), CALIBRATED[mode]
+    found = calibrated(measured(clean[mode], seed=1), mode, cycles=True)
+    case = CALIBRATED[mode]
     check_intervals(found, case)
     for name in ("block_acceleration", "relative_velocity", "relative_displacement"):
         assert found[f"relative_misfit_{name}"].item() == pytest.approx(0.02, rel=0.15), name
@@ -63,7 +75,11 @@ def test_noise_digitisation_and_cycles(clean: dict[str, xr.Dataset], mode: str) 
         off = (found[f"cycle_{name}"] - case[name]) / found[f"cycle_{name}_error"]
         assert np.abs(off).max() < 4.5, name
     if mode == "stick_slip":
-        top = found.computed_block_acceleration.where(found.computed_relative_velocity > 0).max().item()
+        top = (
+            found.computed_block_acceleration.where(found.computed_relative_velocity > 0)
+            .max()
+            .item()
+        )
         np.testing.assert_allclose(found.cycle_attenuation_coefficient, top / 9.81, rtol=0.05)
     else:
         assert np.isnan(found.cycle_yield_acceleration).all()
@@ -76,7 +92,10 @@ def test_coverage(kind: str) -> None:
     for seed in range(4):
         case, test = drawn(kind, seed)
         found = slipsweep.calibrate(
-            sensed(test, ("white", "12 bits")[seed % 2], seed), case["theta"], case["mu_s"], cycles=False
+            sensed(test, ("white", "12 bits")[seed % 2], seed),
+            case["theta"],
+            case["mu_s"],
+            cycles=False,
         )
         for name in SOUGHT:
             low, high = found[f"{name}_interval"].values
@@ -95,9 +114,13 @@ def test_two_branches_are_united_and_a_second_test_tells_them_apart(tmp_path: Pa
     assert np.isnan(found.yield_acceleration_error)
     # nothing that can be pasted unread
     assert all(line.startswith("#") for line in found.attrs["model_table"].splitlines())
-    assert "# WARNING: not ready for use.\n# Üy, λ and Δμ are not determined" in found.attrs["model_table"]
+    assert (
+        "# WARNING: not ready for use.\n# Üy, λ and Δμ are not determined"
+        in found.attrs["model_table"]
+    )
     assert found.attrs["uncertainty_table"] == ""
-    # at twice the noise a reading next to what refutes it comes and goes with the rounding of the search
+    # at twice the noise a reading next to what refutes it comes and goes with the rounding of the
+    # search
     strong = measured(exact({**BRANCHES, "amplitude": 5.0}), seed=2, noise=0.005)
     both = slipsweep.calibrate([weak, strong], 5.0, 0.38, cycles=False)
     check_intervals(both, BRANCHES, 1.0)
@@ -155,7 +178,9 @@ def test_a_missing_channel(clean: dict[str, xr.Dataset], missing: str) -> None:
 
 
 def test_displacement_alone_does_not_tell_decay_from_excess(clean: dict[str, xr.Dataset]) -> None:
-    found = calibrated(measured(clean["stick_slip"], seed=3, noise=0.05, responses=["relative_displacement"]))
+    found = calibrated(
+        measured(clean["stick_slip"], seed=3, noise=0.05, responses=["relative_displacement"])
+    )
     assert "Measure the acceleration of the block" in found.attrs["findings"]
     assert found.attrs["model_table"].startswith("# WARNING")
     check_intervals(found, CALIBRATED["stick_slip"])
@@ -168,16 +193,23 @@ def test_sensors_at_fault(clean: dict[str, xr.Dataset]) -> None:
     first, second, *_ = found.attrs["findings"].splitlines()
     assert first.startswith("The misfit is larger than the noise of the sensors: ")
     assert second.endswith("give drift = 'relative_displacement'.")
-    assert found.attrs["model_table"].startswith("# WARNING: not ready for use.\n# The misfit is larger")
+    assert found.attrs["model_table"].startswith(
+        "# WARNING: not ready for use.\n# The misfit is larger"
+    )
     assert found.attrs["uncertainty_table"] == ""
     caption = " ".join(found.slipsweep.chart().get_supxlabel().split())
-    assert caption.startswith("Not ready for use. The misfit is larger than the noise of the sensors: ")
+    assert caption.startswith(
+        "Not ready for use. The misfit is larger than the noise of the sensors: "
+    )
     test.ground_acceleration.values[:] += 0.2
     drift = 0.2 * float(np.ptp(test.time.values))
     for drifts in ("relative_displacement", "all"):
         asked = calibrated(test, drift=drifts, offset="ground_acceleration")
         check_intervals(asked, CALIBRATED["stick_slip"])
-        for name, true in (("drift of relative_displacement", drift), ("offset of ground_acceleration", 0.2)):
+        for name, true in (
+            ("drift of relative_displacement", drift),
+            ("offset of ground_acceleration", 0.2),
+        ):
             (said,) = re.findall(rf"{name}: ([\d.]+) ± ([\d.]+)", asked.attrs["removed"])
             assert abs(float(said[0]) - true) < min(3.5 * float(said[1]), 0.1 * true), name
 
@@ -219,8 +251,12 @@ def test_the_tables_to_paste_run(clean: dict[str, xr.Dataset], tmp_path: Path) -
     path.write_text(found.attrs["model_table"] + axes)
     assert cli.main(["run", str(path), "-q", "-o", str(tmp_path / "model.nc")]) == 0
     with xr.open_dataset(tmp_path / "model.nc") as result:
-        assert result.yield_acceleration.item() == pytest.approx(found.yield_acceleration.item(), rel=1e-5)
-    path.write_text(sweep_file_text(found.attrs["model_table"], found.attrs["uncertainty_table"]) + axes)
+        assert result.yield_acceleration.item() == pytest.approx(
+            found.yield_acceleration.item(), rel=1e-5
+        )
+    path.write_text(
+        sweep_file_text(found.attrs["model_table"], found.attrs["uncertainty_table"]) + axes
+    )
     assert cli.main(["run", str(path), "-q", "-o", str(tmp_path / "band.nc")]) == 0
 
 

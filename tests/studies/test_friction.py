@@ -29,7 +29,9 @@ def friction(test: Any, **options: Any) -> xr.Dataset:
 
 def test_few_slides_have_the_interval_of_student() -> None:
     values = np.array([0.2, 0.3, 0.4])
-    np.testing.assert_allclose(_mean(values, 0.0, 0.0)[[0, 2]], stats.t.interval(0.95, 2, 0.3, stats.sem(values)))
+    np.testing.assert_allclose(
+        _mean(values, 0.0, 0.0)[[0, 2]], stats.t.interval(0.95, 2, 0.3, stats.sem(values))
+    )
 
 
 def test_friction_is_that_of_the_simulation(stick_slip: xr.Dataset) -> None:
@@ -38,21 +40,29 @@ def test_friction_is_that_of_the_simulation(stick_slip: xr.Dataset) -> None:
     table = found.ground_acceleration.values
     sliding = (table[2:] > table[1:-1]) & (table[1:-1] > table[:-2]) & (table[:-2] > 1.0)
     law = (0.38 + 0.09) * np.exp(-2.7 * table[1:-1] / 9.81)
-    np.testing.assert_allclose(found.friction_coefficient.values[1:-1][sliding], law[sliding], rtol=1e-10)
-    np.testing.assert_allclose(found.least_friction, (0.38 + 0.09) * np.exp(-2.7 * 3.55 / 9.81), rtol=1e-3)
+    np.testing.assert_allclose(
+        found.friction_coefficient.values[1:-1][sliding], law[sliding], rtol=1e-10
+    )
+    np.testing.assert_allclose(
+        found.least_friction, (0.38 + 0.09) * np.exp(-2.7 * 3.55 / 9.81), rtol=1e-3
+    )
     np.testing.assert_allclose(found.friction_ratio, found.friction_coefficient / 0.38, rtol=1e-15)
 
 
 def test_eq1_is_that_of_the_equations() -> None:
     values = eq1_friction(np.array([-2.0, 3.0]), np.array([-1.0, 2.5]), 8.0, 0.4, 9.81)
     for i, (table, block) in enumerate(((-2.0, -1.0), (3.0, 2.5))):
-        expected = equations.mobilised_friction(table, block, 0.4, math.tan(math.radians(8.0)), 9.81)
+        expected = equations.mobilised_friction(
+            table, block, 0.4, math.tan(math.radians(8.0)), 9.81
+        )
         assert values[i] == pytest.approx(expected, rel=1e-14)
 
 
 @pytest.mark.parametrize("kinetic", [0.38, 0.25])
 @pytest.mark.parametrize("noise", [0.0, 0.02])
-def test_coulombs_friction_is_level_by_statics_where_eq1_falls(kinetic: float, noise: float) -> None:
+def test_coulombs_friction_is_level_by_statics_where_eq1_falls(
+    kinetic: float, noise: float
+) -> None:
     found = slipsweep.measured_friction(coulomb(kinetic, noise), 6.0, 0.38)
     assert found.sizes["slide"] == 6
     assert found.least_friction.max() < 0.15
@@ -72,7 +82,10 @@ def test_coulombs_friction_is_level_by_statics_where_eq1_falls(kinetic: float, n
 def test_friction_above_the_static_one_is_doubted() -> None:
     """As of a channel whose sign is reversed, or whose unit is another one."""
     found = slipsweep.measured_friction(coulomb(0.38, 0.0), 6.0, 0.25)
-    assert "more than mu_s = 0.25: are signs and units of all channels" in found.attrs["constant_friction"]
+    assert (
+        "more than mu_s = 0.25: are signs and units of all channels"
+        in found.attrs["constant_friction"]
+    )
 
 
 def test_a_decaying_interface_is_not_called_constant(stick_slip: xr.Dataset) -> None:
@@ -124,7 +137,9 @@ def test_the_threshold_is_reported(stick_slip: xr.Dataset) -> None:
 
 
 def test_unequal_sampling(stick_slip: xr.Dataset) -> None:
-    kept = np.sort(np.random.default_rng(1).permutation(stick_slip.time.size)[: stick_slip.time.size * 2 // 3])
+    kept = np.sort(
+        np.random.default_rng(1).permutation(stick_slip.time.size)[: stick_slip.time.size * 2 // 3]
+    )
     found = friction(stick_slip.isel(time=kept))
     np.testing.assert_allclose(found.slide_onset, friction(stick_slip).slide_onset, atol=0.025)
     assert found.sizes["slide"] == 5
@@ -136,7 +151,11 @@ def test_offset_and_drift_are_taken_off_where_named(stick_slip: xr.Dataset) -> N
     asked = friction(drifting, drift="block_acceleration", rest=(0.0, 0.495))
     np.testing.assert_allclose(asked.block_acceleration, stick_slip.block_acceleration, atol=1e-12)
     assert asked.attrs["removed"] == "block_acceleration: 0.4 m s-2 and 0.1 m s-2 a second"
-    late = friction(drifting.assign_coords(time=drifting.time + 10), drift="block_acceleration", rest=(10, 10.495))
+    late = friction(
+        drifting.assign_coords(time=drifting.time + 10),
+        drift="block_acceleration",
+        rest=(10, 10.495),
+    )
     np.testing.assert_allclose(late.block_acceleration, stick_slip.block_acceleration, atol=1e-12)
     unasked = friction(drifting)
     np.testing.assert_array_equal(unasked.block_acceleration, drifting.block_acceleration)
@@ -145,22 +164,35 @@ def test_offset_and_drift_are_taken_off_where_named(stick_slip: xr.Dataset) -> N
 
 def test_a_file_is_read_with_its_units(stick_slip: xr.Dataset, tmp_path: Path) -> None:
     path = tmp_path / "test.csv"
-    time, tables, blocks = (stick_slip[name].values for name in ("time", "ground_acceleration", "block_acceleration"))
+    time, tables, blocks = (
+        stick_slip[name].values for name in ("time", "ground_acceleration", "block_acceleration")
+    )
     columns = time * 1e3, tables / 9.80665, blocks * 100
-    rows = "\n".join(f"{t:.9g};{table:.15g};;{block:.15g}" for t, table, block in zip(*columns, strict=True))
-    path.write_text(f"# a test\nTime [ms];Table acceleration (g);remark;Block_acceleration (gal)\n{rows}\n")
+    rows = "\n".join(
+        f"{t:.9g};{table:.15g};;{block:.15g}" for t, table, block in zip(*columns, strict=True)
+    )
+    path.write_text(
+        f"# a test\nTime [ms];Table acceleration (g);remark;Block_acceleration (gal)\n{rows}\n"
+    )
     found = friction(path)
-    np.testing.assert_allclose(found.friction_coefficient, friction(stick_slip).friction_coefficient, atol=1e-12)
+    np.testing.assert_allclose(
+        found.friction_coefficient, friction(stick_slip).friction_coefficient, atol=1e-12
+    )
     assert found.attrs["test"] == "test.csv"
     assert len(found.attrs["test_sha256"]) == 64
 
 
 def test_a_dataset_is_taken_in_its_units(stick_slip: xr.Dataset) -> None:
-    in_g = {name: stick_slip[name] / 9.80665 for name in ("ground_acceleration", "block_acceleration")}
+    in_g = {
+        name: stick_slip[name] / 9.80665 for name in ("ground_acceleration", "block_acceleration")
+    }
     for array in in_g.values():
         array.attrs["units"] = "g"
-    found, expected = friction(in_g), friction(stick_slip)
-    np.testing.assert_allclose(found.friction_coefficient, expected.friction_coefficient, atol=1e-12)
+    found = friction(in_g)
+    expected = friction(stick_slip)
+    np.testing.assert_allclose(
+        found.friction_coefficient, expected.friction_coefficient, atol=1e-12
+    )
 
 
 HEAD = "time (s),table acceleration (m/s2),block acceleration (m/s2)\n"
@@ -174,10 +206,19 @@ ROWS = "".join(f"{i / 100},{math.sin(i)},{math.sin(i)}\n" for i in range(20))
         (ROWS, "0 columns of time"),
         (HEAD.replace(" (m/s2),", ","), r"'table acceleration': must give its unit in brackets"),
         (HEAD.replace("(m/s2),", "(mm),") + ROWS, r"must be a unit that converts to m s-2"),
-        (HEAD + ROWS.replace("0.05,", "0.04,"), "time of sample 6 = 0.04: must be greater than 0.04"),
+        (
+            HEAD + ROWS.replace("0.05,", "0.04,"),
+            "time of sample 6 = 0.04: must be greater than 0.04",
+        ),
         (HEAD + "\n".join([*ROWS.splitlines(), "9,0,0"]), "no samples from t = 0.19 to 9 s"),
-        (HEAD + "0,1,one\n", "line 2: '0,1,one': must be 3 cells, and a number, or nothing, for time"),
-        (HEAD.replace(",block acceleration", ",temperature") + ROWS, "block_acceleration: missing: Eq. 1 needs"),
+        (
+            HEAD + "0,1,one\n",
+            "line 2: '0,1,one': must be 3 cells, and a number, or nothing, for time",
+        ),
+        (
+            HEAD.replace(",block acceleration", ",temperature") + ROWS,
+            "block_acceleration: missing: Eq. 1 needs",
+        ),
     ],
 )
 def test_files_that_are_no_tests(text: str, message: str, tmp_path: Path) -> None:
@@ -197,7 +238,9 @@ def test_files_that_are_no_tests(text: str, message: str, tmp_path: Path) -> Non
         ({"theta": 80.0}, "the block would lift off"),
     ],
 )
-def test_options_that_cannot_be(stick_slip: xr.Dataset, options: dict[str, Any], message: str) -> None:
+def test_options_that_cannot_be(
+    stick_slip: xr.Dataset, options: dict[str, Any], message: str
+) -> None:
     with pytest.raises(InputError, match=message):
         friction(stick_slip, **options)
 
@@ -211,9 +254,12 @@ def test_a_blank_cell_is_a_sample_that_is_not_there(stick_slip: xr.Dataset) -> N
 
 
 def test_the_friction_angle_stands_for_the_coefficient() -> None:
-    path, phi = Path(__file__).parents[2] / "sweeps/data/shaking_test.csv", np.degrees(np.arctan(0.38))
+    path = Path(__file__).parents[2] / "sweeps/data/shaking_test.csv"
+    phi = np.degrees(np.arctan(0.38))
     xr.testing.assert_allclose(
-        slipsweep.measured_friction(path, 5.0, phi=phi), slipsweep.measured_friction(path, 5.0, 0.38), rtol=1e-12
+        slipsweep.measured_friction(path, 5.0, phi=phi),
+        slipsweep.measured_friction(path, 5.0, 0.38),
+        rtol=1e-12,
     )
     with pytest.raises(InputError, match=r"^mu_s: must be given$"):
         slipsweep.measured_friction(path, 5.0)

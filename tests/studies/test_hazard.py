@@ -11,13 +11,29 @@ import xarray as xr
 from scipy.stats import norm
 
 import slipsweep
-from slipsweep import HazardCurve, InputError, Newmark, Record, RunError, Suite, Validity, displacement_hazard
+from slipsweep import (
+    HazardCurve,
+    InputError,
+    Newmark,
+    Record,
+    RunError,
+    Suite,
+    Validity,
+    displacement_hazard,
+)
 from slipsweep.model.options import MODELS
-from slipsweep.studies.hazard import exceedance_rates, fragility, openquake_fragility, read_hazard_curve
+from slipsweep.studies.hazard import (
+    exceedance_rates,
+    fragility,
+    openquake_fragility,
+    read_hazard_curve,
+)
 from tests.studies.test_suite_statistics import suite_result
 from tests.support.commands import command
 
-CURVE = "# a site\nPGA (g); annual rate (1/yr); note\n0.1; 0.01; a\n\n0.4; 0.0005; b\n1.6; 0.00001; c\n"
+CURVE = (
+    "# a site\nPGA (g); annual rate (1/yr); note\n0.1; 0.01; a\n\n0.4; 0.0005; b\n1.6; 0.00001; c\n"
+)
 
 ATTRIBUTES = {"source": "slipsweep test", **MODELS.attributes(Newmark())}
 
@@ -39,12 +55,16 @@ def power_law(k0: float, k: float, points: int = 12) -> HazardCurve:
 
 @pytest.mark.parametrize("k", [0.5, 2.5, 4.0])
 @pytest.mark.parametrize(("median", "beta"), [(0.3, 0.3), (5.0, 0.9)])
-def test_the_closed_form_of_a_power_law_and_a_lognormal_fragility(k: float, median: float, beta: float) -> None:
+def test_the_closed_form_of_a_power_law_and_a_lognormal_fragility(
+    k: float, median: float, beta: float
+) -> None:
     """λ = k0 θ^-k exp(k² β² / 2) (Cornell 1996)."""
     k0 = 3e-4
     expected = k0 * median**-k * math.exp(0.5 * (k * beta) ** 2)
     amplitude = median * np.exp(beta * np.linspace(-12.0, 12.0, 2401))
-    found = exceedance_rates(power_law(k0, k), amplitude, norm.cdf(np.log(amplitude / median) / beta))
+    found = exceedance_rates(
+        power_law(k0, k), amplitude, norm.cdf(np.log(amplitude / median) / beta)
+    )
     assert float(found["annual_rate"]) == pytest.approx(expected, rel=1e-3)
     assert float(found["omitted_rate"]) < 1e-9 * expected
     assert found["lower_rate"] < expected < found["upper_rate"] < 1.1 * expected
@@ -72,41 +92,60 @@ def test_what_lies_outside_is_told() -> None:
     np.testing.assert_allclose(wider["annual_rate"], [0.05, 0.0], rtol=1e-12)
     np.testing.assert_allclose(wider["held_rate"], [0.0005, 0.0], rtol=1e-12)
     np.testing.assert_array_equal(wider["omitted_rate"], [np.nan, 0.0])
-    with pytest.raises(InputError, match=r"reaches from 1 to 10 m/s2, .* from 20 to 30 m/s2: they must overlap"):
+    with pytest.raises(
+        InputError, match=r"reaches from 1 to 10 m/s2, .* from 20 to 30 m/s2: they must overlap"
+    ):
         exceedance_rates(curve, [20.0, 30.0], [0.1, 0.2])
 
 
 def test_against_quadrature() -> None:
     """Straight lines of the fragility over a curve with a kink between, by a fine sum."""
     curve = curve_of([0.5, 3.0, 12.0], [0.02, 0.003, 0.00005])
-    amplitude, chance = np.array([1.0, 2.0, 6.0, 9.0]), np.array([0.0, 0.3, 0.2, 0.9])
+    amplitude = np.array([1.0, 2.0, 6.0, 9.0])
+    chance = np.array([0.0, 0.3, 0.2, 0.9])
     fine = np.geomspace(1.0, 9.0, 400_001)
-    rates, chances = curve.rate_at(fine), np.interp(np.log(fine), np.log(amplitude), chance)
+    rates = curve.rate_at(fine)
+    chances = np.interp(np.log(fine), np.log(amplitude), chance)
     expected = np.sum(0.5 * (chances[1:] + chances[:-1]) * -np.diff(rates)) + 0.9 * rates[-1]
-    assert float(exceedance_rates(curve, amplitude, chance)["annual_rate"]) == pytest.approx(expected, rel=1e-9)
+    assert float(exceedance_rates(curve, amplitude, chance)["annual_rate"]) == pytest.approx(
+        expected, rel=1e-9
+    )
 
 
-def test_the_rate_lies_between_those_of_the_lower_and_the_higher_probability_of_two_amplitudes() -> None:
+def test_the_rate_lies_between_those_of_the_lower_and_the_higher_probability_of_two_amplitudes() -> (
+    None
+):
     curve = curve_of([0.5, 2.0, 8.0], [0.1, 0.01, 0.001])
     found = exceedance_rates(curve, [1.0, 4.0], [[0.0], [1.0]])
     first, last = curve.rate_at(np.array([1.0, 4.0]))
-    np.testing.assert_allclose([found["lower_rate"][0], found["upper_rate"][0]], [last, first], rtol=1e-12)
+    np.testing.assert_allclose(
+        [found["lower_rate"][0], found["upper_rate"][0]], [last, first], rtol=1e-12
+    )
 
 
 def test_of_a_suite_by_hand() -> None:
     """Shares of motions; amplitudes in any order and 0; amplitudes, and grid points, without a value."""
-    nan, unstable = np.nan, int(Validity.STATICALLY_UNSTABLE)
-    u = np.array([[0.0, 0.0, 0.0], [nan, 0.2, 0.0], [nan, nan, nan], [0.0, 0.2, 0.5], [0.3, 0.2, 0.5]])
+    nan = np.nan
+    unstable = int(Validity.STATICALLY_UNSTABLE)
+    u = np.array(
+        [[0.0, 0.0, 0.0], [nan, 0.2, 0.0], [nan, nan, nan], [0.0, 0.2, 0.5], [0.3, 0.2, 0.5]]
+    )
     values = np.stack([u, np.full_like(u, nan)])
     flags = np.where(np.isnan(values), unstable, 0)
     result = suite_result(values, flags, ("mu_s", "amplitude", "motion"))
     result = result.assign_coords(amplitude=[0.0, 1.0, 2.0, 3.0, 4.0])
     curve = curve_of([0.5, 8.0], [0.4, 0.4 / 256])  # 0.1 a⁻²
     expected = exceedance_rates(curve, [1.0, 3.0, 4.0], [[0.5, 0.0], [2 / 3, 1 / 3], [1.0, 1 / 3]])
-    for given in (result, result.isel(amplitude=[2, 0, 3, 1, 4]), result.transpose("motion", "amplitude", "mu_s")):
+    for given in (
+        result,
+        result.isel(amplitude=[2, 0, 3, 1, 4]),
+        result.transpose("motion", "amplitude", "mu_s"),
+    ):
         found = displacement_hazard(given, curve, ["100mm", 0.4])
         assert found.annual_rate.dims == ("mu_s", "threshold")
-        np.testing.assert_allclose(found.annual_rate, np.array([expected["annual_rate"], [nan, nan]]), rtol=1e-12)
+        np.testing.assert_allclose(
+            found.annual_rate, np.array([expected["annual_rate"], [nan, nan]]), rtol=1e-12
+        )
         np.testing.assert_allclose(found.held_rate[0], expected["held_rate"], rtol=1e-12)
         np.testing.assert_allclose(found.omitted_rate[0], expected["omitted_rate"], rtol=1e-12)
         assert found.valueless_share.values.tolist() == [1.0, 1.0]
@@ -114,7 +153,10 @@ def test_of_a_suite_by_hand() -> None:
     with pytest.raises(RunError, match="the model gives no value under any motion"):
         displacement_hazard(result.isel(mu_s=[1]), curve)
     for one in (result.isel(amplitude=1), result.rename(amplitude="pgv")):
-        with pytest.raises(InputError, match="amplitude: must be a dimension of two peak ground accelerations or more"):
+        with pytest.raises(
+            InputError,
+            match="amplitude: must be a dimension of two peak ground accelerations or more",
+        ):
             displacement_hazard(one, curve)
     with pytest.raises(InputError, match="only two peak ground accelerations have a value, and P"):
         displacement_hazard(result.isel(amplitude=[1, 4]), curve, 0.1)
@@ -125,12 +167,20 @@ def test_of_a_suite_by_hand() -> None:
 
 def test_friction_that_is_uncertain_over_a_suite() -> None:
     """Pooled by `sample` or not, motions weigh the same; the rate is that of the fragility of all samples."""
-    curve, times = power_law(1e-3, 2.0), np.arange(0.0, 4.0, 0.01)
-    motions = [Record(times, np.sin(2.0 * np.pi * f * times) * np.exp(-times), name=f"m{f}") for f in (0.8, 1.5, 2.5)]
+    curve = power_law(1e-3, 2.0)
+    times = np.arange(0.0, 4.0, 0.01)
+    motions = [
+        Record(times, np.sin(2.0 * np.pi * f * times) * np.exp(-times), name=f"m{f}")
+        for f in (0.8, 1.5, 2.5)
+    ]
     given: dict[str, Any] = {
-        "theta": 5.0, "amplitude": [2.0, 4.0, 6.0, 8.0], "excitation": Suite(tuple(motions)), "samples": 256,
-        "uncertain": {"mu_s": {"distribution": "lognorm", "s": 0.1, "scale": 0.4}}, "thresholds": [0.01, 0.1],
-    }  # fmt: skip
+        "theta": 5.0,
+        "amplitude": [2.0, 4.0, 6.0, 8.0],
+        "excitation": Suite(tuple(motions)),
+        "samples": 256,
+        "uncertain": {"mu_s": {"distribution": "lognorm", "s": 0.1, "scale": 0.4}},
+        "thresholds": [0.01, 0.1],
+    }
     pooled = slipsweep.sample(**given, over="motion")
     found = displacement_hazard(pooled, curve)
     chances = pooled.exceedance_probability.transpose("amplitude", "threshold").values
@@ -139,7 +189,10 @@ def test_friction_that_is_uncertain_over_a_suite() -> None:
     assert found.attrs["suite_dimensions"] == "motion samples"
     apart = displacement_hazard(slipsweep.sample(**given), curve, ["10cm"])
     np.testing.assert_allclose(apart.annual_rate, expected["annual_rate"][1:], rtol=1e-12)
-    with pytest.raises(InputError, match=r"thresholds = 0.03: not among those of the result, 0.01, 0.1 m: add it to"):
+    with pytest.raises(
+        InputError,
+        match=r"thresholds = 0.03: not among those of the result, 0.01, 0.1 m: add it to",
+    ):
         displacement_hazard(pooled, curve, 0.03)
 
 
@@ -152,7 +205,9 @@ def test_a_fragility_in_the_form_of_openquake() -> None:
     (model,) = root.findall("nrml:fragilityModel", space)
     assert model.findtext("nrml:limitStates", namespaces=space) == "u_above_10_mm u_above_50_mm"
     functions = model.findall("nrml:fragilityFunction", space)
-    assert [one.attrib for one in functions] == [{"id": f"mu_s_{mu}", "format": "discrete"} for mu in (0.3, 0.4)]
+    assert [one.attrib for one in functions] == [
+        {"id": f"mu_s_{mu}", "format": "discrete"} for mu in (0.3, 0.4)
+    ]
     imls = functions[0].find("nrml:imls", space)
     assert imls is not None
     assert (imls.text, imls.attrib) == ("0.1 0.2 0.4", {"imt": "PGA", "noDamageLimit": "0.1"})
@@ -166,7 +221,9 @@ def test_a_curve_is_read(tmp_path: Path) -> None:
     curve = read_hazard_curve(path, 9.81)
     np.testing.assert_allclose(curve.amplitude, [0.981, 3.924, 15.696], rtol=1e-15)
     assert curve.rate.tolist() == [0.01, 0.0005, 0.00001]
-    assert float(curve.rate_at(np.array([1.962]))[0]) == pytest.approx(math.sqrt(0.01 * 0.0005), rel=1e-12)
+    assert float(curve.rate_at(np.array([1.962]))[0]) == pytest.approx(
+        math.sqrt(0.01 * 0.0005), rel=1e-12
+    )
 
 
 OPENQUAKE = """\
@@ -198,8 +255,14 @@ def test_a_file_of_openquake(tmp_path: Path) -> None:
         ("", "line 1: 0 columns of PGA: must be one, as in PGA (g), annual rate"),
         ("PGA (mm), annual rate\n1,2\n", 'unit = "mm": must be a unit that converts to m s-2'),
         ("PGA (g), annual probability\n1,2\n", "must be an annual rate, -ln(1 - p)"),
-        ("PGA (g), annual rate\n0.1,x\n", "line 2: '0.1,x': must be 2 cells, and a number, or nothing, for PGA"),
-        ("PGA (m/s2), annual rate\n1,0.02\n1,0.01\n", "amplitude of point 2 = 1: must be > 0, and greater than"),
+        (
+            "PGA (g), annual rate\n0.1,x\n",
+            "line 2: '0.1,x': must be 2 cells, and a number, or nothing, for PGA",
+        ),
+        (
+            "PGA (m/s2), annual rate\n1,0.02\n1,0.01\n",
+            "amplitude of point 2 = 1: must be > 0, and greater than",
+        ),
         ("PGA (m/s2), annual rate\n1,0.02\n2,0\n", "rate of point 2 = 0: must be > 0"),
     ],
 )
@@ -220,7 +283,9 @@ def test_the_command(tmp_path: Path) -> None:
     u[:, :2] = 0.0
     u[0, 5, :3] = np.nan
     flags = np.where(np.isnan(u), int(Validity.UPLIFT), 0)
-    result = suite_result(u, flags, ("mu_s", "amplitude", "motion")).assign_coords(amplitude=amplitude, mu_s=[0.3, 0.4])
+    result = suite_result(u, flags, ("mu_s", "amplitude", "motion")).assign_coords(
+        amplitude=amplitude, mu_s=[0.3, 0.4]
+    )
     write(tmp_path, result)
     run = ("hazard", "a.nc", "--curve", "hazard.csv", "-d", "0.2", "-d", "50mm", "-d", "90m")
     done = command(tmp_path, *run, "-o", "h.svg", "-o", "h.png", "-o", "f.xml")
@@ -234,8 +299,14 @@ def test_the_command(tmp_path: Path) -> None:
     ]
     assert [line[:3] for line in table] == ["0.3", "   ", "   ", "0.4", "   ", "   "]
     assert "up to 33.3% of the motions have no value" in done.stdout
-    assert "annual rate 0: the displacement is not exceeded at any amplitude of the result\n" in done.stdout
-    assert "above 1.019 g P(u > d) is taken as it is there: to compute it, extend the axis amplitude" in done.stdout
+    assert (
+        "annual rate 0: the displacement is not exceeded at any amplitude of the result\n"
+        in done.stdout
+    )
+    assert (
+        "above 1.019 g P(u > d) is taken as it is there: to compute it, extend the axis amplitude"
+        in done.stdout
+    )
     assert "put more values on the axis amplitude" in done.stdout
     assert (tmp_path / "h.svg").read_text(encoding="utf-8").count("μs = 0.4") == 1
     assert (tmp_path / "f.xml").read_text().count("<poes") == 6
@@ -248,23 +319,36 @@ def test_the_command(tmp_path: Path) -> None:
 
 def test_the_end_of_the_curve_is_told_from_the_end_of_the_sweep(tmp_path: Path) -> None:
     u = np.array([[0.0, 0.1], [0.1, 0.2], [0.3, 0.4]])
-    result = suite_result(u, np.zeros_like(u), ("amplitude", "motion")).assign_coords(amplitude=[5.0, 10.0, 20.0])
+    result = suite_result(u, np.zeros_like(u), ("amplitude", "motion")).assign_coords(
+        amplitude=[5.0, 10.0, 20.0]
+    )
     write(tmp_path, result, "PGA (m/s2), annual rate\n6, 0.01\n12, 0.001\n")
     done = command(tmp_path, "hazard", "a.nc", "--curve", "hazard.csv", "-d", "5cm")
-    assert "above 1.223 g P(u > d) is taken as it is there: to compute it, extend the hazard curve" in done.stdout
-    assert "the hazard curve begins at 0.6116 g, where displacements are exceeded already" in done.stdout
+    assert (
+        "above 1.223 g P(u > d) is taken as it is there: to compute it, extend the hazard curve"
+        in done.stdout
+    )
+    assert (
+        "the hazard curve begins at 0.6116 g, where displacements are exceeded already"
+        in done.stdout
+    )
 
 
 @pytest.mark.parametrize(
     ("given", "message"),
     [
         (("--at", "mu_s=0.35"), "its neighbours are 0.3 and 0.4"),
-        (("-d", "50"), "--displacement = 50: without a unit that is 50 m; give the unit: -d 50mm or -d 50m"),
+        (
+            ("-d", "50"),
+            "--displacement = 50: without a unit that is 50 m; give the unit: -d 50mm or -d 50m",
+        ),
         (("--site", "2"), "site = 2: only for a file of OpenQuake"),
     ],
 )
 def test_what_the_command_refuses(tmp_path: Path, given: tuple[str, ...], message: str) -> None:
-    result = suite_result(np.full((2, 3, 4), 0.1), np.zeros((2, 3, 4)), ("mu_s", "amplitude", "motion"))
+    result = suite_result(
+        np.full((2, 3, 4), 0.1), np.zeros((2, 3, 4)), ("mu_s", "amplitude", "motion")
+    )
     result = result.assign_coords(mu_s=[0.3, 0.4])
     write(tmp_path, result)
     lengths = () if "-d" in given else ("-d", "1cm")

@@ -21,14 +21,22 @@ SHAKEN: dict[str, Any] = {
 
 def history(yield_acceleration: float, excitation: Any) -> Any:
     return simulate(
-        0, 0.4, 3, 1.5, model="newmark", excitation=excitation, yield_acceleration=yield_acceleration,
+        0,
+        0.4,
+        3,
+        1.5,
+        model="newmark",
+        excitation=excitation,
+        yield_acceleration=yield_acceleration,
         points_per_cycle=16,
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize("shaken", SHAKEN)
 @pytest.mark.parametrize("yield_acceleration", [0.3, 1e-2, 1e-7, 1e-30])
-def test_a_long_slide_has_a_bounded_number_of_points(shaken: str, yield_acceleration: float) -> None:
+def test_a_long_slide_has_a_bounded_number_of_points(
+    shaken: str, yield_acceleration: float
+) -> None:
     whole = history(yield_acceleration, SHAKEN[shaken])
     cycles = SHAKEN[shaken].cycles
     time = whole.time.values
@@ -38,7 +46,9 @@ def test_a_long_slide_has_a_bounded_number_of_points(shaken: str, yield_accelera
     np.testing.assert_allclose(shaking, np.arange(16 * cycles + 1) / 16 / 1.5, rtol=1e-14)
     # at rest, where the sweep says, and at no time before
     assert whole.relative_velocity.values[-1] == 0.0
-    assert whole.relative_displacement.values[-1] == pytest.approx(whole.permanent_displacement.item(), rel=1e-12)
+    assert whole.relative_displacement.values[-1] == pytest.approx(
+        whole.permanent_displacement.item(), rel=1e-12
+    )
     speed = whole.relative_velocity.values[16 * cycles]
     if speed > 0.0:
         assert whole.relative_velocity.values[-2] > 0.0
@@ -47,7 +57,9 @@ def test_a_long_slide_has_a_bounded_number_of_points(shaken: str, yield_accelera
         np.testing.assert_allclose(braked[:-1], expected[:-1], rtol=1e-6, atol=1e-9 * speed)
         # the last interval ends with the slide
         if time.size == 16 * (cycles + 100) + 1:
-            assert time[-1] - time[16 * cycles] == pytest.approx(speed / yield_acceleration, rel=1e-9)
+            assert time[-1] - time[16 * cycles] == pytest.approx(
+                speed / yield_acceleration, rel=1e-9
+            )
 
 
 def test_a_finely_sampled_sine_in_continuous_sliding() -> None:
@@ -57,35 +69,59 @@ def test_a_finely_sampled_sine_in_continuous_sliding() -> None:
     assert sine.sliding_mode == 2
     friction = slipsweep.friction_parameters(**block, amplitude=6.5).minimum_friction.item()
     t_theta = np.tan(np.radians(6.0))
-    held = 6.5 - (9.81 + 6.5 * t_theta) * (0.38 - t_theta - friction) - 9.81 * t_theta  # Eq. 4 at the peak
+    held = (
+        6.5 - (9.81 + 6.5 * t_theta) * (0.38 - t_theta - friction) - 9.81 * t_theta
+    )  # Eq. 4 at the peak
     left = sine.relative_velocity.item()
     u = sine.permanent_displacement.item() + left * abs(left) / (2 * held)
     errors = []
     for samples in (250, 4000):
         times = np.arange(3 * samples + 1) / (2.0 * samples)
         found = sweep(**block, excitation=Record(times, 6.5 * np.sin(4 * np.pi * times)))
-        assert (found.number_of_slips, found.stick_slip_pulses, found.continuous_pulses) == (1, 0, 3)
+        assert (found.number_of_slips, found.stick_slip_pulses, found.continuous_pulses) == (
+            1,
+            0,
+            3,
+        )
         errors.append(abs(found.permanent_displacement.item() / u - 1))
-        np.testing.assert_allclose(found.peak_relative_velocity, sine.peak_relative_velocity, rtol=10 / samples**2)
+        np.testing.assert_allclose(
+            found.peak_relative_velocity, sine.peak_relative_velocity, rtol=10 / samples**2
+        )
     assert errors[1] < errors[0] / 150
 
 
-@pytest.mark.parametrize("solver", ["cycle", slipsweep.Step("simpson", 4096)], ids=["cycle", "step"])
+@pytest.mark.parametrize(
+    "solver", ["cycle", slipsweep.Step("simpson", 4096)], ids=["cycle", "step"]
+)
 @pytest.mark.parametrize(
     "excitation",
-    [*(Sine(cycles, ramp) for cycles in (10, 23) for ramp in (0.3, 1.3, 2.0, 2.3)), slipsweep.Cosine(12)],
+    [
+        *(Sine(cycles, ramp) for cycles in (10, 23) for ramp in (0.3, 1.3, 2.0, 2.3)),
+        slipsweep.Cosine(12),
+    ],
     ids=str,
 )
-def test_cycles_behind_a_ramp_repeat_from_what_it_leaves(excitation: Sine | slipsweep.Cosine, solver: Any) -> None:
+def test_cycles_behind_a_ramp_repeat_from_what_it_leaves(
+    excitation: Sine | slipsweep.Cosine, solver: Any
+) -> None:
     """A block that does not recouple comes out of the first cycles in motion: its pulses repeat from that velocity."""
-    cell: dict[str, Any] = {"theta": 0, "mu_s": 0.4, "amplitude": 3, "frequency": 1, "yield_acceleration": 1e-3}
+    cell: dict[str, Any] = {
+        "theta": 0,
+        "mu_s": 0.4,
+        "amplitude": 3,
+        "frequency": 1,
+        "yield_acceleration": 1e-3,
+    }
     swept = sweep(**cell, excitation=excitation, solver=solver)
     history = simulate(**cell, excitation=excitation)
     assert int(swept.validity) & slipsweep.Validity.NOT_RECOUPLED
-    assert float(swept.permanent_displacement) == pytest.approx(float(history.relative_displacement[-1]), rel=1e-10)
+    assert float(swept.permanent_displacement) == pytest.approx(
+        float(history.relative_displacement[-1]), rel=1e-10
+    )
 
 
-#: The sample's motions have many pieces; harmonic ones come again and again at phases that are rounded.
+#: The sample's motions have many pieces; harmonic ones come again and again at phases that are
+#: rounded.
 WHOLE: dict[str, Any] = {
     **SHAKEN,
     "triangle": slipsweep.Triangle(cycles=40, ramp_in=1.5),
@@ -98,15 +134,20 @@ WHOLE: dict[str, Any] = {
 @pytest.mark.parametrize("shaken", WHOLE)
 def test_velocity_has_no_gaps_where_pieces_meet(shaken: str, model: Any) -> None:
     """At an instant that rounding puts between two pieces the block does not stand still."""
-    excitation, given = WHOLE[shaken], {"theta": 3, "mu_s": 0.4, "yield_acceleration": 0.3, "model": model}
+    excitation = WHOLE[shaken]
+    given = {"theta": 3, "mu_s": 0.4, "yield_acceleration": 0.3, "model": model}
     if isinstance(excitation, Record):
         times = excitation.times
     else:
         given |= {"amplitude": 2.5, "frequency": 1.7}
         times = np.arange(48 * excitation.cycles + 1) / 48 / 1.7
     about = np.concatenate([np.nextafter(times, 0), times, np.nextafter(times, np.inf)])
-    about = np.concatenate([np.nextafter(about, 0), about, np.nextafter(about, np.inf), times + 1e-13, times - 1e-13])
-    velocity = simulate(excitation=excitation, **given, times=np.unique(about.clip(0))).relative_velocity
+    about = np.concatenate(
+        [np.nextafter(about, 0), about, np.nextafter(about, np.inf), times + 1e-13, times - 1e-13]
+    )
+    velocity = simulate(
+        excitation=excitation, **given, times=np.unique(about.clip(0))
+    ).relative_velocity
     assert np.abs(np.diff(velocity)[np.diff(velocity.time) < 1e-12]).max() < 1e-10
     assert velocity.max() > 0.01
 
@@ -146,10 +187,12 @@ def case_of(seed: int) -> dict[str, Any]:
 
 def test_a_history_ends_where_the_sweep_does(shaking: Record) -> None:
     """At rest, with the results of the sweep to the last bit and the displacement to rounding."""
-    valued, modes = 0, set()
+    valued = 0
+    modes = set()
     for seed in range(40):
         given = case_of(seed)
-        found, swept = simulate(excitation=shaking, **given), sweep(excitation=shaking, **given)
+        found = simulate(excitation=shaking, **given)
+        swept = sweep(excitation=shaking, **given)
         for name in DEFAULT_RECORD_RESULTS:
             np.testing.assert_array_equal(found[name], swept[name])
         if np.isnan(swept.permanent_displacement):
@@ -158,12 +201,17 @@ def test_a_history_ends_where_the_sweep_does(shaking: Record) -> None:
             continue
         valued += 1
         modes |= {(bool(swept.stick_slip_pulses > 0), bool(swept.continuous_pulses > 0))}
-        assert found.relative_displacement.values[-1] == pytest.approx(swept.permanent_displacement.item(), rel=1e-12)
+        assert found.relative_displacement.values[-1] == pytest.approx(
+            swept.permanent_displacement.item(), rel=1e-12
+        )
         assert abs(found.relative_velocity.values[-1]) <= 1e-9 * swept.peak_relative_velocity.item()
-        peak, time = swept.peak_relative_velocity.item(), found.time.values
+        peak = swept.peak_relative_velocity.item()
+        time = found.time.values
         at = np.clip(found.relative_velocity.values.argmax(), 1, time.size - 2)
         # everywhere, and closely where a short slide may have its peak
-        places = np.unique([*np.linspace(0.0, time[-1], 40_000), *np.linspace(time[at - 1], time[at + 1], 2_000)])
+        places = np.unique(
+            [*np.linspace(0.0, time[-1], 40_000), *np.linspace(time[at - 1], time[at + 1], 2_000)]
+        )
         fine = simulate(excitation=shaking, **given, times=places)
         assert 0.999 * peak <= fine.relative_velocity.max().item() <= peak * (1 + 1e-12)
     assert valued > 20
@@ -173,9 +221,13 @@ def test_a_history_ends_where_the_sweep_does(shaking: Record) -> None:
 @pytest.mark.parametrize("seed", [3, 9, 40])
 def test_velocity_and_displacement_are_integrals(shaking: Record, seed: int) -> None:
     """v̇ = Üg − Ü and u̇ = v, but for velocities upslope that a stick-slip pulse neglects."""
-    given = case_of(seed) | {"model": "newmark" if seed % 2 else Mendez(recoupling="integrate"), "scale": 2.0}
+    given = case_of(seed) | {
+        "model": "newmark" if seed % 2 else Mendez(recoupling="integrate"),
+        "scale": 2.0,
+    }
     found = simulate(excitation=shaking, **given, times=np.linspace(0.0, 60.0, 600_001))
-    velocity, step = found.relative_velocity.values, 1e-4
+    velocity = found.relative_velocity.values
+    step = 1e-4
     assert velocity.max() > 0.0
     moved = np.concatenate([[0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * step)])
     np.testing.assert_allclose(moved, found.relative_displacement, atol=1e-4 * abs(moved).max())
@@ -189,13 +241,20 @@ def test_velocity_and_displacement_are_integrals(shaking: Record, seed: int) -> 
 
 def test_a_triangle_given_by_its_corners_moves_as_the_waveform() -> None:
     """In stick-slip, whose rules are the same under a record."""
-    cycles, frequency = 4, 1.3
+    cycles = 4
+    frequency = 1.3
     corners = np.array([0.0, 1.0, 0.0, -1.0])
     times = np.arange(4 * cycles + 1) / (4 * frequency)
     record = Record(times, 3.0 * np.append(np.tile(corners, cycles), 0.0))
     block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.45, "yield_acceleration": 1.1}
     at = np.linspace(0.0, 5.0, 4001)
-    wave = simulate(**block, amplitude=3.0, frequency=frequency, excitation=slipsweep.Triangle(cycles=cycles), times=at)
+    wave = simulate(
+        **block,
+        amplitude=3.0,
+        frequency=frequency,
+        excitation=slipsweep.Triangle(cycles=cycles),
+        times=at,
+    )
     assert wave.sliding_mode == slipsweep.SlidingMode.STICK_SLIP
     own = simulate(**block, excitation=record, times=at)
     for name in HISTORY:
@@ -222,7 +281,9 @@ def test_the_plane_moves_as_recorded(shaking: Record) -> None:
     late = Record(shaking.times + 3.0, shaking.acceleration)
     times = np.linspace(-1.0, 30.0, 12_345)
     found = simulate(5.0, 0.4, excitation=late, amplitude=4.0, polarity=-1, times=times)
-    expected = np.interp(times, late.times, -4.0 / late.peak * late.acceleration, left=0.0, right=0.0)
+    expected = np.interp(
+        times, late.times, -4.0 / late.peak * late.acceleration, left=0.0, right=0.0
+    )
     np.testing.assert_allclose(found.ground_acceleration, expected, atol=1e-13)
     before = times < 3.0
     assert (found.relative_displacement.values[before] == 0.0).all()
@@ -260,7 +321,9 @@ except KeyboardInterrupt:
 
 
 def test_a_history_of_many_cycles_hears_ctrl_c() -> None:
-    done = subprocess.run([sys.executable, "-c", ENDLESS], capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", ENDLESS], capture_output=True, text=True, timeout=300, check=False
+    )
     assert (done.stdout, done.stderr) == ("heard True\n", "")
 
 

@@ -19,22 +19,37 @@ from tests.support.made_up_records import made
 
 def sweep_at(amplitude: xr.DataArray, inputs: dict[str, Any], **options: Any) -> xr.DataArray:
     given: dict[str, Any] = {
-        name: xr.DataArray(values, dims=name) if np.ndim(values) else values for name, values in inputs.items()
+        name: xr.DataArray(values, dims=name) if np.ndim(values) else values
+        for name, values in inputs.items()
     }
     return sweep(
         **choices(
-            amplitude=amplitude.fillna(0.0), **given, solver="cycle", variables=["permanent_displacement"], **options
+            amplitude=amplitude.fillna(0.0),
+            **given,
+            solver="cycle",
+            variables=["permanent_displacement"],
+            **options,
         )
     ).permanent_displacement
 
 
 @pytest.mark.parametrize(
     "options",
-    [{}, {"rise": "literal"}, {"recoupling": "integrate"}, {"model": "newmark"}, {"yield_acceleration": 0.6}],
+    [
+        {},
+        {"rise": "literal"},
+        {"recoupling": "integrate"},
+        {"model": "newmark"},
+        {"yield_acceleration": 0.6},
+    ],
     ids=str,
 )
 def test_inverse_of_sweep_to_the_last_bit(options: dict[str, Any]) -> None:
-    inputs: dict[str, Any] = {"theta": [0.0, 6.0, 14.0], "mu_s": [0.2, 0.38, 0.7, 1.2], "frequency": [0.3, 1.0, 7.0]}
+    inputs: dict[str, Any] = {
+        "theta": [0.0, 6.0, 14.0],
+        "mu_s": [0.2, 0.38, 0.7, 1.2],
+        "frequency": [0.3, 1.0, 7.0],
+    }
     displacement = [1e-3, 0.05, 0.8]
     limits = limit_amplitude(displacement, **choices(**inputs, **options))
     assert limits.limit_amplitude.dims == ("theta", "mu_s", "frequency", "displacement")
@@ -53,8 +68,14 @@ def test_inverse_of_sweep_to_the_last_bit(options: dict[str, Any]) -> None:
 
 def test_newmark_closed_form() -> None:
     """One pulse of Newmark's block, solved by Brent's method on the classical closed form."""
-    yielded, omega, g = 1.5, 2 * math.pi * 2.0, 9.81
-    block: dict[str, Any] = {"yield_acceleration": yielded, "model": "newmark", "excitation": slipsweep.Sine(cycles=1)}
+    yielded = 1.5
+    omega = 2 * math.pi * 2.0
+    g = 9.81
+    block: dict[str, Any] = {
+        "yield_acceleration": yielded,
+        "model": "newmark",
+        "excitation": slipsweep.Sine(cycles=1),
+    }
 
     def displacement(amplitude: float) -> float:
         start = math.asin(yielded / amplitude)
@@ -64,11 +85,16 @@ def test_newmark_closed_form() -> None:
 
         stop = brentq(velocity, math.pi - start, start + 2 * math.pi, xtol=1e-15)
         slid = stop - start
-        travel = amplitude * (slid * math.cos(start) - math.sin(stop) + math.sin(start)) - yielded * slid * slid / 2
+        travel = (
+            amplitude * (slid * math.cos(start) - math.sin(stop) + math.sin(start))
+            - yielded * slid * slid / 2
+        )
         return travel / omega**2
 
     for target in (1e-4, 0.004, 0.02):
-        expected = brentq(lambda a, target=target: displacement(a) - target, yielded * 1.0001, 5 * g, xtol=1e-14)
+        expected = brentq(
+            lambda a, target=target: displacement(a) - target, yielded * 1.0001, 5 * g, xtol=1e-14
+        )
         limits = limit_amplitude(target, 3, 0.5, 2.0, maximum_amplitude=5 * g, **block)
         assert limits.limit_amplitude.item() == pytest.approx(expected, rel=1e-10)
         assert limits.limit_status.item() == LimitStatus.REACHED
@@ -78,7 +104,8 @@ def test_target_in_the_jump_of_the_mode_limit() -> None:
     limit = slipsweep.friction_parameters(5, 0.3, 1.0).limiting_acceleration.item()
     amplitudes = np.concatenate([np.linspace(2.0, limit, 20_001), [np.nextafter(limit, np.inf)]])
     moved = sweep(5, 0.3, amplitudes, 2.0).permanent_displacement.values
-    below, above = moved[:-1].max(), moved[-1]
+    below = moved[:-1].max()
+    above = moved[-1]
     assert above > 1.5 * below
     limits = limit_amplitude(np.linspace(below * 1.001, above * 0.999, 5), 5, 0.3, 2.0)
     np.testing.assert_array_equal(limits.limit_amplitude, np.nextafter(limit, np.inf))
@@ -89,7 +116,9 @@ def test_target_in_the_jump_of_the_mode_limit() -> None:
 def test_gap_in_validity() -> None:
     """With mu_s > 1 the calibrated decay rate is not positive below the mode limit, from xi = mu_s^-1/2 on."""
     given: dict[str, Any] = {"theta": 10, "mu_s": 1.2, "frequency": 1.0, "yield_acceleration": 4.0}
-    limit = slipsweep.friction_parameters(10, 1.2, 1.0, yield_acceleration=4.0).limiting_acceleration.item()
+    limit = slipsweep.friction_parameters(
+        10, 1.2, 1.0, yield_acceleration=4.0
+    ).limiting_acceleration.item()
     edge = limit / math.sqrt(1.2)
     amplitudes = np.linspace(4.0, edge * (1 - 1e-12), 20_001)
     below = sweep(**choices(amplitude=amplitudes, **given)).permanent_displacement.max().item()
@@ -98,7 +127,9 @@ def test_gap_in_validity() -> None:
     assert limits.limit_amplitude[0].item() < edge
     assert limits.limit_amplitude[1].item() == np.nextafter(limit, np.inf)
     assert limits.limit_status[1].item() == LimitStatus.AFTER_GAP
-    limits = limit_amplitude([below * 0.5, below * 1.001], **choices(**given | {"frequency": [1.0, 2.0]}))
+    limits = limit_amplitude(
+        [below * 0.5, below * 1.001], **choices(**given | {"frequency": [1.0, 2.0]})
+    )
     legend = [text.get_text() for text in limits.slipsweep.chart().legends[0].get_texts()]
     assert "set by a discontinuity\nof the model" in legend
 
@@ -113,16 +144,25 @@ def test_smallest_amplitude_of_a_dense_scan() -> None:
         (2, 0.4, {"rise": "literal"}),
     ]
     for theta, mu_s, options in cases:
-        moved = sweep(theta, mu_s, amplitudes, 1.5, **choices(**options)).permanent_displacement.values
+        moved = sweep(
+            theta, mu_s, amplitudes, 1.5, **choices(**options)
+        ).permanent_displacement.values
         targets = np.geomspace(1e-4, np.nanmax(moved), 60)[:-1]
-        limits = limit_amplitude(targets, theta, mu_s, 1.5, **choices(**options)).limit_amplitude.values
+        limits = limit_amplitude(
+            targets, theta, mu_s, 1.5, **choices(**options)
+        ).limit_amplitude.values
         first = amplitudes[(moved[:, np.newaxis] >= targets).argmax(axis=0)]
         assert ((first - limits >= 0) & (first - limits <= step)).all()
 
 
 def test_beside_a_gap_every_displacement_is_reached() -> None:
     """With the literal rise Kd comes to 0 at the gap's edge, and the run-out v²/(2 g Kd) beyond all bounds."""
-    given: dict[str, Any] = {"theta": 0, "mu_s": [0.3, 0.4, 0.6], "yield_acceleration": 1.0, "frequency": 1.0}
+    given: dict[str, Any] = {
+        "theta": 0,
+        "mu_s": [0.3, 0.4, 0.6],
+        "yield_acceleration": 1.0,
+        "frequency": 1.0,
+    }
     given["model"] = Mendez("literal")
     limits = limit_amplitude([1e3, 1e6, 1e9], **given).transpose("mu_s", "displacement")
     assert (limits.limit_status[:, 2] == LimitStatus.AFTER_GAP).all()
@@ -162,7 +202,11 @@ def test_narrow_peaks_where_blocks_do_not_recouple() -> None:
 def test_peaks_of_a_record_where_slips_become_one(seed: int, displacement: float) -> None:
     """The limit is never above the first of 20 000 amplitudes that reaches the target."""
     one = made(seed)
-    given: dict[str, Any] = {"theta": one.theta, "mu_s": one.mu_s, **choices(**one.given, excitation=one.record)}
+    given: dict[str, Any] = {
+        "theta": one.theta,
+        "mu_s": one.mu_s,
+        **choices(**one.given, excitation=one.record),
+    }
     limit = limit_amplitude(displacement, **given).limit_amplitude.item()
     amplitudes = np.geomspace(0.5 * limit, 1.5 * limit, 20_001)
     moved = sweep(amplitude=amplitudes, **given).permanent_displacement.values
@@ -172,15 +216,22 @@ def test_peaks_of_a_record_where_slips_become_one(seed: int, displacement: float
 
 def test_statuses_without_a_limit() -> None:
     limits = limit_amplitude(1e6, [0, 20], 0.3, 1.0)
-    np.testing.assert_array_equal(limits.limit_status, [LimitStatus.NOT_REACHED, LimitStatus.INVALID])
+    np.testing.assert_array_equal(
+        limits.limit_status, [LimitStatus.NOT_REACHED, LimitStatus.INVALID]
+    )
     assert limits.limit_amplitude.isnull().all()
     assert limits.permanent_displacement.isnull().all()
     assert (limits.sliding_mode == SlidingMode.MISSING).all()
     assert limits.validity[1].item() & Validity.STATICALLY_UNSTABLE
-    assert limit_amplitude(1e6, 12, 0.3, 1.0, maximum_amplitude=60.0).validity.item() & Validity.UPLIFT  # at its end
+    assert (
+        limit_amplitude(1e6, 12, 0.3, 1.0, maximum_amplitude=60.0).validity.item() & Validity.UPLIFT
+    )  # at its end
     assert limit_amplitude("50mm", 5, 0.3, 1.0).displacement == 0.05
     # never beyond the end of the search: yield lies above it
-    assert limit_amplitude(0.01, 0, 0.5, 1.0, maximum_amplitude=1.0).limit_status == LimitStatus.NOT_REACHED
+    assert (
+        limit_amplitude(0.01, 0, 0.5, 1.0, maximum_amplitude=1.0).limit_status
+        == LimitStatus.NOT_REACHED
+    )
 
 
 def test_zipped_inputs_and_slabs(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -208,7 +259,13 @@ def test_zipped_inputs_and_slabs(monkeypatch: pytest.MonkeyPatch) -> None:
     ],
 )
 def test_refusals(given: dict[str, Any], message: str) -> None:
-    asked: dict[str, Any] = {"displacement": 0.05, "theta": 5, "mu_s": 0.4, "frequency": 1.0, **given}
+    asked: dict[str, Any] = {
+        "displacement": 0.05,
+        "theta": 5,
+        "mu_s": 0.4,
+        "frequency": 1.0,
+        **given,
+    }
     with pytest.raises(InputError) as refused:
         limit_amplitude(**choices(**asked))
     assert message in str(refused.value)
@@ -256,11 +313,18 @@ def test_limits_are_exact_and_the_first(shaking: Record) -> None:
             continue
         limit = found.limit_amplitude.item()
         names = ("permanent_displacement", "validity", *RECORD_COUNTS)
-        at = sweep(excitation=shaking, **given, amplitude=[np.nextafter(limit, 0.0), limit], variables=names)
+        at = sweep(
+            excitation=shaking,
+            **given,
+            amplitude=[np.nextafter(limit, 0.0), limit],
+            variables=names,
+        )
         below, above = at.permanent_displacement.values
         assert above >= wanted
         assert not below >= wanted
-        scan = sweep(excitation=shaking, **given, amplitude=np.linspace(0.2 * limit, limit, 4000)[:-1])
+        scan = sweep(
+            excitation=shaking, **given, amplitude=np.linspace(0.2 * limit, limit, 4000)[:-1]
+        )
         assert not (scan.permanent_displacement >= wanted).any(), seed
         for name in names:
             assert found[name].item() == at[name].values[1]
@@ -279,15 +343,22 @@ def test_time_and_sign_only_scale(shaking: Record) -> None:
     block: dict[str, Any] = {"theta": [0.0, 8.0], "mu_s": [0.35, 0.6]}
     wanted = np.array([0.002, 0.05])
     one = limit_amplitude(wanted, **block, excitation=shaking, polarity="both")
-    slow = limit_amplitude(4.0 * wanted, **block, excitation=shaking, polarity="both", time_scale=2.0)
+    slow = limit_amplitude(
+        4.0 * wanted, **block, excitation=shaking, polarity="both", time_scale=2.0
+    )
     np.testing.assert_array_equal(one.limit_amplitude, slow.limit_amplitude)
     np.testing.assert_array_equal(4.0 * one.permanent_displacement, slow.permanent_displacement)
-    turned = limit_amplitude(wanted, **block, excitation=Record(shaking.times, -shaking.acceleration), polarity=[-1, 1])
+    turned = limit_amplitude(
+        wanted, **block, excitation=Record(shaking.times, -shaking.acceleration), polarity=[-1, 1]
+    )
     np.testing.assert_array_equal(one.limit_amplitude, turned.limit_amplitude)
     assert one.limit_amplitude.dims == ("theta", "mu_s", "polarity", "displacement")
     # the strength of the record itself plays no part
     strong = limit_amplitude(
-        wanted, **block, excitation=Record(shaking.times, 8.0 * shaking.acceleration), polarity="both"
+        wanted,
+        **block,
+        excitation=Record(shaking.times, 8.0 * shaking.acceleration),
+        polarity="both",
     )
     np.testing.assert_array_equal(one.limit_amplitude, strong.limit_amplitude)
 
@@ -324,10 +395,17 @@ def test_command_on_sweep_and_on_result(tmp_path: Path) -> None:
     assert command(tmp_path, "run", "small.toml", "-q").returncode == 0
     # the file holds what `limit_amplitude` gives with the sweep's own options
     expected = limit_amplitude(
-        [0.02, 0.05], [0, 5], [0.3, 0.5], [1, 2, 4], model="newmark", excitation=slipsweep.Sine(cycles=3)
+        [0.02, 0.05],
+        [0, 5],
+        [0.3, 0.5],
+        [1, 2, 4],
+        model="newmark",
+        excitation=slipsweep.Sine(cycles=3),
     )
     for source, result in (("small.toml", "one.nc"), ("small.nc", "two.nc")):
-        done = command(tmp_path, "limit", source, "-d", "50mm", "-d", "2 cm", "-o", result, "-o", "l.svg")
+        done = command(
+            tmp_path, "limit", source, "-d", "50mm", "-d", "2 cm", "-o", result, "-o", "l.svg"
+        )
         assert (done.returncode, done.stderr) == (0, "")
         assert "24 limits (2 theta x 2 mu_s x 3 frequency x 2 displacement)" in done.stdout
         with xr.open_dataset(tmp_path / result) as dataset:

@@ -48,27 +48,53 @@ def assert_same_data(one: Path, other: Path) -> None:
     assert list(first.variables) == list(second.variables)
     xr.testing.assert_equal(first, second)
     names = {*first.attrs} - {"history"}
-    assert {name: first.attrs[name] for name in names} == {name: second.attrs[name] for name in names}
+    assert {name: first.attrs[name] for name in names} == {
+        name: second.attrs[name] for name in names
+    }
 
 
 def test_a_sweep_file_gives_what_python_gives(folder: Path) -> None:
     run(folder / "a.toml", folder / "a.nc")
     record = read_record(folder / "motion.csv", units="g")
     expected = sweep(
-        [0, 5, 25], [0.3, 0.4], scale=np.linspace(0.5, 3, 4), time_scale=[1, 2], polarity="both", excitation=record
+        [0, 5, 25],
+        [0.3, 0.4],
+        scale=np.linspace(0.5, 3, 4),
+        time_scale=[1, 2],
+        polarity="both",
+        excitation=record,
     )
     assert 0 < float(expected.permanent_displacement.max()) < 100
     assert (expected.number_of_slips == -1).any()
     with xr.open_dataset(folder / "a.nc", mask_and_scale=False) as result:
-        assert list(result.permanent_displacement.dims) == ["theta", "mu_s", "scale", "time_scale", "polarity"]
+        assert list(result.permanent_displacement.dims) == [
+            "theta",
+            "mu_s",
+            "scale",
+            "time_scale",
+            "polarity",
+        ]
         for name in DEFAULT_RECORD_RESULTS:
             np.testing.assert_array_equal(result[name], expected[name], err_msg=name)
-            assert result[name].attrs.get("ancillary_variables") == (None if name == "validity" else "validity")
+            assert result[name].attrs.get("ancillary_variables") == (
+                None if name == "validity" else "validity"
+            )
         np.testing.assert_array_equal(result.record_acceleration, record.acceleration)
         np.testing.assert_array_equal(result.record_time, record.times)
-        assert result.attrs["record_sha256"] == hashlib.sha256((folder / "motion.csv").read_bytes()).hexdigest()
-        kept = {name: result.attrs[name] for name in ("record", "record_format", "record_units", "baseline")}
-        assert kept == {"record": "motion.csv", "record_format": "csv", "record_units": "g", "baseline": "none"}
+        assert (
+            result.attrs["record_sha256"]
+            == hashlib.sha256((folder / "motion.csv").read_bytes()).hexdigest()
+        )
+        kept = {
+            name: result.attrs[name]
+            for name in ("record", "record_format", "record_units", "baseline")
+        }
+        assert kept == {
+            "record": "motion.csv",
+            "record_format": "csv",
+            "record_units": "g",
+            "baseline": "none",
+        }
 
 
 def test_a_result_repeats_itself_without_the_record(folder: Path) -> None:
@@ -78,7 +104,9 @@ def test_a_result_repeats_itself_without_the_record(folder: Path) -> None:
     (folder / "motion.csv").unlink()
     run(folder / "a.nc", folder / "b.nc")
     assert_same_data(folder / "a.nc", folder / "b.nc")
-    with pytest.raises(InputError, match=r"a\.toml: excitation\.record: .*motion\.csv: cannot be read"):
+    with pytest.raises(
+        InputError, match=r"a\.toml: excitation\.record: .*motion\.csv: cannot be read"
+    ):
         spec.load(folder / "a.toml")
 
 
@@ -90,7 +118,11 @@ def test_a_result_repeats_itself_without_the_record(folder: Path) -> None:
         ('record = "motion.csv"\n', "", "excitation.units: only beside excitation.record"),
         ("time_scale.values", "amplitude.values", "amplitude, scale: must not both be given"),
         ("time_scale.values", "frequency.values", "frequency: not allowed with a Record"),
-        ("[axes]", '[output]\nvariables = ["sliding_mode"]\n[axes]', "variables = 'sliding_mode': must be"),
+        (
+            "[axes]",
+            '[output]\nvariables = ["sliding_mode"]\n[axes]',
+            "variables = 'sliding_mode': must be",
+        ),
     ],
 )
 def test_sweep_files_that_are_refused(folder: Path, old: str, new: str, message: str) -> None:

@@ -68,7 +68,11 @@ def test_estimates_are_those_of_scipy() -> None:
         return np.array([first, [np.mean((a - other) ** 2) / 2 / variance for other in others]])
 
     theirs = stats.bootstrap(
-        [np.arange(512)], statistic, n_resamples=4000, method="percentile", rng=np.random.default_rng(1)
+        [np.arange(512)],
+        statistic,
+        n_resamples=4000,
+        method="percentile",
+        rng=np.random.default_rng(1),
     ).confidence_interval
     ours = np.stack([found["first_order_interval"], found["total_interval"]])
     width = theirs.high - theirs.low
@@ -90,13 +94,22 @@ def test_intervals_of_random_numbers_hold_the_truth_as_often_as_they_say() -> No
 def test_a_product_of_two_inputs() -> None:
     """u = W(A)/ω²: with A and f drawn the variance of a product, whose indices have a closed form."""
     block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.4}
-    strength, pace = stats.uniform(3.0, 5.0), stats.lognorm(0.1, scale=2.0)
+    strength = stats.uniform(3.0, 5.0)
+    pace = stats.lognorm(0.1, scale=2.0)
     found = slipsweep.sample(
-        **block, uncertain={"amplitude": strength, "frequency": pace}, samples=2**14, sensitivity=True
+        **block,
+        uncertain={"amplitude": strength, "frequency": pace},
+        samples=2**14,
+        sensitivity=True,
     )
     levels = (np.arange(20000) + 0.5) / 20000
-    alone = slipsweep.sweep(**block, amplitude=strength.ppf(levels), frequency=1.0).permanent_displacement.values
-    scatter = {"amplitude": np.var(alone) / np.mean(alone) ** 2, "frequency": np.exp(4 * 0.1**2) - 1}
+    alone = slipsweep.sweep(
+        **block, amplitude=strength.ppf(levels), frequency=1.0
+    ).permanent_displacement.values
+    scatter = {
+        "amplitude": np.var(alone) / np.mean(alone) ** 2,
+        "frequency": np.exp(4 * 0.1**2) - 1,
+    }
     variance = np.prod([1 + value for value in scatter.values()]) - 1
     for name, other in (("amplitude", "frequency"), ("frequency", "amplitude")):
         one = found.sel(input=name)
@@ -106,9 +119,16 @@ def test_a_product_of_two_inputs() -> None:
 
 def test_an_input_without_effect_has_no_index() -> None:
     """λ plays no part where the yield acceleration governs: not to the last bit."""
-    block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.4, "yield_acceleration": 2.5, "decay_rate": 8.0}
+    block: dict[str, Any] = {
+        "theta": 5.0,
+        "mu_s": 0.4,
+        "yield_acceleration": 2.5,
+        "decay_rate": 8.0,
+    }
     uncertain = {"decay_rate": FACTOR, "amplitude": {**FACTOR, "s": 0.05}}
-    found = slipsweep.sample(**block, amplitude=4.0, frequency=1.0, uncertain=uncertain, sensitivity=True, samples=1024)
+    found = slipsweep.sample(
+        **block, amplitude=4.0, frequency=1.0, uncertain=uncertain, sensitivity=True, samples=1024
+    )
     assert found.flag_share.sel(flag=int(slipsweep.Validity.YIELD_GOVERNS)) == 1.0
     assert found.total_index.sel(input="decay_rate") == 0.0
     assert found.first_order_index.sel(input="decay_rate") == 0.0
@@ -117,7 +137,12 @@ def test_an_input_without_effect_has_no_index() -> None:
 
 
 def test_correlated_inputs_are_one() -> None:
-    uncertain = {"mu_s": {**FACTOR, "s": 0.05}, "amplitude": FACTOR, "decay_rate": FACTOR, "delta_mu": FACTOR}
+    uncertain = {
+        "mu_s": {**FACTOR, "s": 0.05},
+        "amplitude": FACTOR,
+        "decay_rate": FACTOR,
+        "delta_mu": FACTOR,
+    }
     pairs = [("delta_mu", "decay_rate", 0.9), ("mu_s", "delta_mu", 0.1)]
     sampling = sampling_of(uncertain, sensitivity=True, correlation=pairs)
     assert sampling.independent == (("mu_s", "decay_rate", "delta_mu"), ("amplitude",))
@@ -125,15 +150,24 @@ def test_correlated_inputs_are_one() -> None:
     draws = {name: values.reshape(4, -1) for name, values in drawn.items()}
     for name in ("mu_s", "decay_rate", "delta_mu"):
         np.testing.assert_array_equal(draws[name][2:], [draws[name][1], draws[name][0]])
-    np.testing.assert_array_equal(draws["amplitude"][2:], [draws["amplitude"][0], draws["amplitude"][1]])
+    np.testing.assert_array_equal(
+        draws["amplitude"][2:], [draws["amplitude"][0], draws["amplitude"][1]]
+    )
     # of a sum of what is drawn: the variance of the group is that of its sum
     found = reduced(sampling, np.sum([np.log(values) for values in drawn.values()], axis=0))
-    share = (0.05**2 + 2 * 0.3**2 * 1.9 + 2 * 0.1 * 0.05 * 0.3) / (0.05**2 + 2 * 0.3**2 * 1.9 + 0.003 + 0.3**2)
+    share = (0.05**2 + 2 * 0.3**2 * 1.9 + 2 * 0.1 * 0.05 * 0.3) / (
+        0.05**2 + 2 * 0.3**2 * 1.9 + 0.003 + 0.3**2
+    )
     for index in ("first_order_index", "total_index"):
         np.testing.assert_allclose(found[index], [share, 1 - share], rtol=0.02)
 
 
-CASE: dict[str, Any] = {"theta": [0.0, 15.0], "amplitude": [0.5, 4.0, 8.0], "samples": 128, "sensitivity": True}
+CASE: dict[str, Any] = {
+    "theta": [0.0, 15.0],
+    "amplitude": [0.5, 4.0, 8.0],
+    "samples": 128,
+    "sensitivity": True,
+}
 
 
 def test_where_there_are_no_indices_the_status_says_why() -> None:
@@ -147,7 +181,11 @@ def test_where_there_are_no_indices_the_status_says_why() -> None:
     np.testing.assert_array_equal(found.sensitivity_status, expected)
     assert (found.valueless_share.sel(theta=15.0) > 0.3).all()
     for name in ("first_order_index", "first_order_interval", "total_index", "total_interval"):
-        there = found[name].notnull().all([dim for dim in ("input", "bound") if dim in found[name].dims])
+        there = (
+            found[name]
+            .notnull()
+            .all([dim for dim in ("input", "bound") if dim in found[name].dims])
+        )
         np.testing.assert_array_equal(there, found.sensitivity_status == 0)
 
 
@@ -155,7 +193,10 @@ def test_where_there_are_no_indices_the_status_says_why() -> None:
     ("options", "message"),
     [
         ({"sensitivity": 1024}, "sensitivity = 1024: must be true or false"),
-        ({"samples": MOST_SAMPLES // 2}, f"samples = {MOST_SAMPLES // 2}: Sobol indices take .* runs a grid point"),
+        (
+            {"samples": MOST_SAMPLES // 2},
+            f"samples = {MOST_SAMPLES // 2}: Sobol indices take .* runs a grid point",
+        ),
     ],
 )
 def test_what_is_refused(options: dict[str, Any], message: str) -> None:
@@ -186,12 +227,21 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_file_has_what_python_gives(result: Path) -> None:
     found = slipsweep.sample(
-        theta=[0.0, 5.0], amplitude=[0.2, 2.0, 4.0, 6.0, 8.0], frequency=[1.0, 2.0], samples=256, sensitivity=True,
+        theta=[0.0, 5.0],
+        amplitude=[0.2, 2.0, 4.0, 6.0, 8.0],
+        frequency=[1.0, 2.0],
+        samples=256,
+        sensitivity=True,
         uncertain={"mu_s": stats.uniform(0.35, 0.1), "amplitude": FACTOR},
-    )  # fmt: skip
+    )
     with xr.open_dataset(result) as file:
         assert file.input.values.tolist() == ["mu_s", "amplitude"]
         for name in ("first_order_index", "first_order_interval", "total_index", "total_interval"):
-            np.testing.assert_array_equal(file[name].sel(input="amplitude"), found[name].sel(input="amplitude"))
+            np.testing.assert_array_equal(
+                file[name].sel(input="amplitude"), found[name].sel(input="amplitude")
+            )
         np.testing.assert_array_equal(file.sensitivity_status, found.sensitivity_status)
-        assert file.attrs["sensitivity"] == f"Saltelli et al. (2010), 1024 runs; bootstrap of {RESAMPLES}"
+        assert (
+            file.attrs["sensitivity"]
+            == f"Saltelli et al. (2010), 1024 runs; bootstrap of {RESAMPLES}"
+        )

@@ -9,24 +9,41 @@ import xarray as xr
 from slipsweep import InputError, Record, Suite, Validity, suite_statistics, sweep
 from slipsweep.studies.suite_statistics import REASONS
 
-UNSTABLE, UPLIFT, CAUTION = Validity.STATICALLY_UNSTABLE, Validity.UPLIFT, Validity.NOT_RECOUPLED
+UNSTABLE = Validity.STATICALLY_UNSTABLE
+UPLIFT = Validity.UPLIFT
+CAUTION = Validity.NOT_RECOUPLED
 
 
 def suite_result(displacement: Any, validity: Any, dims: tuple[str, ...]) -> xr.Dataset:
     """A result as a sweep returns it, of numbers made up."""
     values = np.asarray(displacement, float)
-    coords: dict[str, Any] = {"motion": [f"m{i}" for i in range(values.shape[dims.index("motion")])]}
+    coords: dict[str, Any] = {
+        "motion": [f"m{i}" for i in range(values.shape[dims.index("motion")])]
+    }
     coords["motion_pga"] = ("motion", np.arange(len(coords["motion"])) + 1.0)
     coords |= {"polarity": [1, -1]} if "polarity" in dims else {}
-    coords |= {dim: np.arange(1.0, 1.0 + values.shape[dims.index(dim)]) for dim in dims if dim not in coords}
-    data = {"permanent_displacement": (dims, values), "validity": (dims, np.asarray(validity, np.int16))}
+    coords |= {
+        dim: np.arange(1.0, 1.0 + values.shape[dims.index(dim)])
+        for dim in dims
+        if dim not in coords
+    }
+    data = {
+        "permanent_displacement": (dims, values),
+        "validity": (dims, np.asarray(validity, np.int16)),
+    }
     return xr.Dataset(data, coords, {"g": 9.81, "suite": "made up"})
 
 
 def test_by_hand() -> None:
     """Rows: some zeros; all zeros; no values; one value; one non-zero value."""
     nan = np.nan
-    values = [[0.0, 0.1, 0.4, nan, 1e-48], [0.0] * 5, [nan] * 5, [nan, 0.2, nan, nan, nan], [0.0, 0.0, 0.0, 0.0, 0.3]]
+    values = [
+        [0.0, 0.1, 0.4, nan, 1e-48],
+        [0.0] * 5,
+        [nan] * 5,
+        [nan, 0.2, nan, nan, nan],
+        [0.0, 0.0, 0.0, 0.0, 0.3],
+    ]
     flags = [
         [0, CAUTION, 0, UPLIFT, 0],
         [0] * 5,
@@ -35,7 +52,9 @@ def test_by_hand() -> None:
         [0] * 5,
     ]
     found = suite_statistics(
-        suite_result(values, flags, ("mu_s", "motion")), thresholds=[0, "10cm"], quantiles=[0.25, 0.5]
+        suite_result(values, flags, ("mu_s", "motion")),
+        thresholds=[0, "10cm"],
+        quantiles=[0.25, 0.5],
     )
     assert "motion" not in found.dims
     assert "motion_pga" not in found.coords
@@ -51,7 +70,9 @@ def test_by_hand() -> None:
     assert upslope.zero_probability == 0.5  # a displacement upslope is none, too
     np.testing.assert_allclose(found.nonzero_median, [0.25, nan, nan, 0.2, 0.3])
     np.testing.assert_allclose(found.nonzero_geometric_mean, [0.2, nan, nan, 0.2, 0.3])
-    np.testing.assert_allclose(found.log_standard_deviation, [np.log(4.0) / np.sqrt(2.0), nan, nan, nan, nan])
+    np.testing.assert_allclose(
+        found.log_standard_deviation, [np.log(4.0) / np.sqrt(2.0), nan, nan, nan, nan]
+    )
     np.testing.assert_array_equal(
         found.exceedance_probability, [[0.5, 0.25], [0.0, 0.0], [nan, nan], [1.0, 1.0], [0.2, 0.2]]
     )
@@ -71,7 +92,13 @@ def test_beside_numpy(over: Any) -> None:
     values[rng.random(values.shape) < 0.2] = np.nan
     given = suite_result(values, np.where(np.isnan(values), int(UPLIFT), 0), dims)
     found = suite_statistics(given, quantiles=[0.1, 0.5, 0.9], thresholds=[0.01, 0.05], over=over)
-    taken = ("motion", "polarity") if over is None else (over,) if isinstance(over, str) else tuple(over)
+    taken = (
+        ("motion", "polarity")
+        if over is None
+        else (over,)
+        if isinstance(over, str)
+        else tuple(over)
+    )
     left = tuple(dim for dim in dims if dim not in taken)
     assert found.nonzero_median.dims == left
     cells = np.moveaxis(values, [dims.index(dim) for dim in taken], range(-len(taken), 0))
@@ -88,17 +115,26 @@ def test_beside_numpy(over: Any) -> None:
             "displacement_quantile": np.quantile(cell, [0.1, 0.5, 0.9]),
             "exceedance_probability": [(cell > 0.01).mean(), (cell > 0.05).mean()],
         }.items():
-            np.testing.assert_allclose(found[name].values[index], expected, rtol=1e-12, err_msg=name)
-    np.testing.assert_array_equal(found.valueless_flag_count.sel(flag=int(UPLIFT)), found.valueless_count)
+            np.testing.assert_allclose(
+                found[name].values[index], expected, rtol=1e-12, err_msg=name
+            )
+    np.testing.assert_array_equal(
+        found.valueless_flag_count.sel(flag=int(UPLIFT)), found.valueless_count
+    )
 
 
 def test_of_a_sweep() -> None:
     """A steep slope has no value, a flat one does not slide; what xarray computes is the same."""
     motions = [
-        Record.sampled(np.random.default_rng(i).normal(size=200) * np.hanning(200), 0.02, f"n{i}") for i in range(5)
+        Record.sampled(np.random.default_rng(i).normal(size=200) * np.hanning(200), 0.02, f"n{i}")
+        for i in range(5)
     ]
     result = sweep(
-        [0, 5, 40], 0.4, amplitude=[0.0, 3.0, 6.0], excitation=Suite(tuple(motions), name="s"), polarity="both"
+        [0, 5, 40],
+        0.4,
+        amplitude=[0.0, 3.0, 6.0],
+        excitation=Suite(tuple(motions), name="s"),
+        polarity="both",
     )
     found = suite_statistics(result, thresholds=[0.0])
     assert found.nonzero_median.dims == ("theta", "amplitude")
@@ -114,7 +150,10 @@ def test_of_a_sweep() -> None:
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"over": "polarity"}, "over = 'polarity': must be a dimension of the result: mu_s, motion"),
+        (
+            {"over": "polarity"},
+            "over = 'polarity': must be a dimension of the result: mu_s, motion",
+        ),
         ({"over": "mu_s"}, "over = 'mu_s': must have motion among them"),
         ({"thresholds": [0.2, 0.1]}, "thresholds: 0.1 after 0.2: they must increase"),
         ({"quantiles": [1.5]}, "quantiles = 1.5: must be a number between 0 and 1"),

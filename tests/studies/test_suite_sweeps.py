@@ -64,7 +64,11 @@ def folder(tmp_path: Path) -> Path:
 def test_a_sweep_file_gives_what_python_gives(folder: Path) -> None:
     run(folder / "a.toml", folder / "a.nc")
     suite = read_suite(folder / "motions", units="g", baseline="mean")
-    given: dict[str, Any] = {"amplitude": np.array([0.3, 0.6]) * 9.81, "time_scale": [1, 2], "polarity": "both"}
+    given: dict[str, Any] = {
+        "amplitude": np.array([0.3, 0.6]) * 9.81,
+        "time_scale": [1, 2],
+        "polarity": "both",
+    }
     expected = sweep([0, 5, 25], [0.1, 0.3], excitation=suite, **given)
     assert 0 < float(expected.permanent_displacement.max()) < 100
     with xr.open_dataset(folder / "a.nc", mask_and_scale=False) as result:
@@ -73,7 +77,8 @@ def test_a_sweep_file_gives_what_python_gives(folder: Path) -> None:
         for name in (*DEFAULT_RECORD_RESULTS, "motion_factor", *MOTION_COORDINATES):
             np.testing.assert_array_equal(result[name], expected[name], err_msg=name)
         np.testing.assert_array_equal(
-            result.permanent_displacement.sel(motion="m1"), expected.permanent_displacement.sel(motion="m1")
+            result.permanent_displacement.sel(motion="m1"),
+            expected.permanent_displacement.sel(motion="m1"),
         )
     with read_result(folder / "a.nc") as file:
         kept = read_embedded(file, folder / "a.nc")
@@ -108,7 +113,14 @@ def test_limits_of_a_suite(folder: Path) -> None:
     store.run(job, folder / "m.nc", command="slipsweep limit a.toml")
     assert_same_data(folder / "l.nc", folder / "m.nc")
     with xr.open_dataset(folder / "l.nc") as result:
-        assert result.limit_amplitude.dims == ("theta", "mu_s", "time_scale", "polarity", "motion", "displacement")
+        assert result.limit_amplitude.dims == (
+            "theta",
+            "mu_s",
+            "time_scale",
+            "polarity",
+            "motion",
+            "displacement",
+        )
         assert result.limit_amplitude.notnull().any()
 
 
@@ -118,12 +130,17 @@ def test_info_and_export_show_the_motions(folder: Path) -> None:
     assert "the same motion under several labels: m0, m4" in done.stdout
     lines = command(folder, "info", "a.nc").stdout.splitlines()
     assert [line.split()[:3] for line in lines[lines.index("motions, as recorded:") + 1 :][:4]] == [
-        ["motion", "samples", "interval"], ["m0", "150", "0.01"], ["m1", "80", "0.02"], ["m2", "200", "0.005"],
-    ]  # fmt: skip
+        ["motion", "samples", "interval"],
+        ["m0", "150", "0.01"],
+        ["m1", "80", "0.02"],
+        ["m2", "200", "0.005"],
+    ]
     one = command(folder, "info", "a.nc", "--at", "polarity=1", "-d", "5cm")
     assert "permanent displacement (mm) over 4 motion x 1 polarity:" in one.stdout
     assert "median" in one.stdout.split()
-    (folder / "b.toml").write_text(SAMPLES.replace("[uncertainty]", "[uncertainty]\nover = 'motion'"))
+    (folder / "b.toml").write_text(
+        SAMPLES.replace("[uncertainty]", "[uncertainty]\nover = 'motion'")
+    )
     assert command(folder, "run", "b.toml", "--quiet").returncode == 0
     with xr.open_dataset(folder / "b.nc") as samples:
         d, u = (float(samples[name].max()) for name in ("threshold", "displacement_quantile"))
@@ -140,9 +157,17 @@ def test_info_and_export_show_the_motions(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("before", "after", "message"),
     [
-        ('["motions/*.csv"]', '["motions/*.AT2"]', r"excitation\.records: motions/\*\.AT2: no file fits"),
+        (
+            '["motions/*.csv"]',
+            '["motions/*.AT2"]',
+            r"excitation\.records: motions/\*\.AT2: no file fits",
+        ),
         ('["motions/*.csv"]', '["motions/*.csv"]\npairs = ["_NS"]', "excitation.pairs = "),
-        ('records = ["motions/*.csv"]', 'record = "motions/m0.csv"\npairs = ["a", "b"]', "excitation.pairs: only"),
+        (
+            'records = ["motions/*.csv"]',
+            'record = "motions/m0.csv"\npairs = ["a", "b"]',
+            "excitation.pairs: only",
+        ),
         ("time_scale.values", "frequency.values", "frequency: not allowed with a Suite"),
         ("time_scale.values", "pgv.values", "amplitude, pgv: must not both be given"),
     ],

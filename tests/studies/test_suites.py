@@ -23,18 +23,39 @@ def noise(seed: int, count: int, interval: float) -> Record:
 
 MOTIONS = (noise(1, 300, 0.01), noise(2, 200, 0.02), noise(3, 500, 0.005))
 SUITE = Suite(MOTIONS, name="three")
-PAIRS = Suite((Pair(MOTIONS[0], noise(4, 280, 0.01)), Pair(MOTIONS[1], noise(5, 200, 0.02))), name="pairs")
+PAIRS = Suite(
+    (Pair(MOTIONS[0], noise(4, 280, 0.01)), Pair(MOTIONS[1], noise(5, 200, 0.02))), name="pairs"
+)
 
 
 @pytest.mark.parametrize(
     ("model", "strength"),
-    [("mendez", "amplitude"), ("newmark", "scale"), ("mendez", "pgv"), ("newmark", "arias_intensity")],
+    [
+        ("mendez", "amplitude"),
+        ("newmark", "scale"),
+        ("mendez", "pgv"),
+        ("newmark", "arias_intensity"),
+    ],
 )
 def test_each_motion_does_what_it_does_alone(model: str, strength: str) -> None:
-    given: dict[str, Any] = {strength: np.array([0.3, 0.9]) * {"amplitude": 6.0, "scale": 2.0}.get(strength, 1.0)}
-    given |= {"time_scale": [1, 2.5], "polarity": "both", "model": model, "variables": tuple(RECORD_RESULTS)}
+    given: dict[str, Any] = {
+        strength: np.array([0.3, 0.9]) * {"amplitude": 6.0, "scale": 2.0}.get(strength, 1.0)
+    }
+    given |= {
+        "time_scale": [1, 2.5],
+        "polarity": "both",
+        "model": model,
+        "variables": tuple(RECORD_RESULTS),
+    }
     found = sweep([0, 5], [0.1, 0.3], excitation=SUITE, **given)
-    assert found.permanent_displacement.dims == ("theta", "mu_s", strength, "time_scale", "polarity", "motion")
+    assert found.permanent_displacement.dims == (
+        "theta",
+        "mu_s",
+        strength,
+        "time_scale",
+        "polarity",
+        "motion",
+    )
     assert found.motion.values.tolist() == ["noise1", "noise2", "noise3"]
     assert float(found.permanent_displacement.max()) > 0.0
     for at, motion in enumerate(MOTIONS):
@@ -50,7 +71,9 @@ def test_the_factor_of_each_motion_makes_the_strength() -> None:
         found = sweep(5, 0.3, excitation=SUITE, variables=["motion_factor"], **given)
         assert found.motion_factor.dims == (strength, "motion")
         for at, motion in enumerate(MOTIONS):
-            for value, factor in zip([0.5, 1.5], found.motion_factor.isel(motion=at).values, strict=True):
+            for value, factor in zip(
+                [0.5, 1.5], found.motion_factor.isel(motion=at).values, strict=True
+            ):
                 scaled = intensity_measures(motion.times, motion.acceleration * factor)
                 assert scaled[measure] == pytest.approx(value, rel=1e-13)
 
@@ -63,7 +86,11 @@ def test_measures_are_coordinates() -> None:
         for name, value in intensity_measures(motion.times, motion.acceleration).items():
             assert float(found[f"motion_{name}"].sel(motion=f"noise{at + 1}")) == value
     assert found.motion_pgv.attrs["units"] == "m s-1"
-    assert found.motion_significant_duration.attrs["units"] == found.motion_mean_period.attrs["units"] == "s"
+    assert (
+        found.motion_significant_duration.attrs["units"]
+        == found.motion_mean_period.attrs["units"]
+        == "s"
+    )
     assert (found.attrs["suite"], found.attrs["motions"]) == ("three", 3)
 
 
@@ -74,7 +101,9 @@ def test_a_value_for_each_motion() -> None:
     assert found.permanent_displacement.dims == ("mu_s", "motion")
     for at, scale in enumerate(scales.values):
         alone = sweep(5, [0.1, 0.3], excitation=MOTIONS[at], scale=scale)
-        np.testing.assert_array_equal(found.permanent_displacement.isel(motion=at), alone.permanent_displacement)
+        np.testing.assert_array_equal(
+            found.permanent_displacement.isel(motion=at), alone.permanent_displacement
+        )
     with pytest.raises(InputError, match="scale: its coordinate 'motion' differs"):
         sweep(5, 0.3, excitation=SUITE, scale=scales.assign_coords(motion=["a", "b", "c"]))
     with pytest.raises(InputError, match=r"2 values along 'motion'|3 values along 'motion'"):
@@ -88,7 +117,8 @@ def test_lazy_results_and_parts_have_the_same_bits() -> None:
     for name in now:
         np.testing.assert_array_equal(later[name].compute(), now[name], err_msg=str(name))
     plan = plan_sweep(
-        Inputs(theta=[0, 5], mu_s=[0.1, 0.3], amplitude=given["amplitude"], polarity="both"), excitation=SUITE
+        Inputs(theta=[0, 5], mu_s=[0.1, 0.3], amplitude=given["amplitude"], polarity="both"),
+        excitation=SUITE,
     )
     part = plan.part({"motion": slice(1, 2), "theta": slice(1, 2)})
     solved = pickle.loads(pickle.dumps(part)).solve()
@@ -109,36 +139,57 @@ def test_an_azimuth_of_pairs_is_the_component_there() -> None:
             component = pair.rotated(azimuth)
             where = {"motion": motion, "azimuth": at}
             alone = sweep([0, 5], 0.2, excitation=component, amplitude=[3.0, 6.0])
-            np.testing.assert_array_equal(found.permanent_displacement.isel(where), alone.permanent_displacement)
+            np.testing.assert_array_equal(
+                found.permanent_displacement.isel(where), alone.permanent_displacement
+            )
             assert float(found.motion_pga.isel(where)) == component.peak
-            assert float(found.motion_mean_period.isel(where)) == mean_period(component.times, component.acceleration)
+            assert float(found.motion_mean_period.isel(where)) == mean_period(
+                component.times, component.acceleration
+            )
 
 
 def test_limits_are_those_of_each_motion() -> None:
-    given: dict[str, Any] = {"displacement": [0.01, 0.1], "theta": 5, "mu_s": [0.1, 0.2], "amplitude_steps": 16}
+    given: dict[str, Any] = {
+        "displacement": [0.01, 0.1],
+        "theta": 5,
+        "mu_s": [0.1, 0.2],
+        "amplitude_steps": 16,
+    }
     found = limit_amplitude(**given, excitation=SUITE, polarity="both")
     assert found.limit_amplitude.dims == ("mu_s", "polarity", "motion", "displacement")
     assert np.isfinite(found.limit_amplitude).any()
     for at, motion in enumerate(MOTIONS):
         alone = limit_amplitude(**given, excitation=motion, polarity="both")
         for name in alone.data_vars:
-            np.testing.assert_array_equal(found[name].isel(motion=at), alone[name], err_msg=str(name))
+            np.testing.assert_array_equal(
+                found[name].isel(motion=at), alone[name], err_msg=str(name)
+            )
     rotated = limit_amplitude(**given, excitation=PAIRS, azimuth=[0, 90])
     first = limit_amplitude(**given, excitation=MOTIONS[0])
-    np.testing.assert_array_equal(rotated.limit_amplitude.isel(motion=0).sel(azimuth=0), first.limit_amplitude)
+    np.testing.assert_array_equal(
+        rotated.limit_amplitude.isel(motion=0).sel(azimuth=0), first.limit_amplitude
+    )
 
 
 @pytest.mark.parametrize(
-    ("strength", "time_scale"), [("amplitude", [1.0, 2.0]), ("pgv", [1.0, 2.0]), ("arias_intensity", 1.5)]
+    ("strength", "time_scale"),
+    [("amplitude", [1.0, 2.0]), ("pgv", [1.0, 2.0]), ("arias_intensity", 1.5)],
 )
 def test_samples_are_those_of_each_motion(strength: str, time_scale: Any) -> None:
-    given: dict[str, Any] = {strength: [0.8, 2.0], "uncertain": UNCERTAIN, "samples": 32, "time_scale": time_scale}
+    given: dict[str, Any] = {
+        strength: [0.8, 2.0],
+        "uncertain": UNCERTAIN,
+        "samples": 32,
+        "time_scale": time_scale,
+    }
     found = sample(5, excitation=SUITE, **given)
     assert (found.mean_displacement > 0.0).any()
     for at, motion in enumerate(MOTIONS):
         alone = sample(5, excitation=motion, **given)
         for name in alone.data_vars:
-            np.testing.assert_allclose(found[name].isel(motion=at), alone[name], rtol=1e-14, err_msg=str(name))
+            np.testing.assert_allclose(
+                found[name].isel(motion=at), alone[name], rtol=1e-14, err_msg=str(name)
+            )
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,9 @@
 """Cells under all options and waveforms, on which the solvers are held to each other.
 
-`groups` draws the options of one sweep and its cells: thousands of cells take few sweeps.  `compare` solves a group
-by steps, some cells as histories and some by the multiple-precision reference; the bounds stand in `FLOORS`.
-`tests/kernels/test_agreement.py` does so for some groups, ``python -m benchmarks.agreement`` for many.
+`groups` draws the options of one sweep and its cells: thousands of cells take few sweeps.
+`compare` solves a group by steps, some cells as histories and some by the multiple-precision
+reference; the bounds stand in `FLOORS`. `tests/kernels/test_agreement.py` does so for some groups,
+``python -m benchmarks.agreement`` for many.
 """
 
 import math
@@ -27,9 +28,22 @@ Found = dict[str, Array]
 
 #: Why a cell is drawn as it is; `REGIMES` names each as often as it is wanted.
 REGIMES = (
-    "coulomb", "coulomb", "measured", "measured", "low_yield", "low_yield", "near_yield", "continuous", "continuous",
-    "near_limit", "given", "given", "sharp", "steep", "anything",
-)  # fmt: skip
+    "coulomb",
+    "coulomb",
+    "measured",
+    "measured",
+    "low_yield",
+    "low_yield",
+    "near_yield",
+    "continuous",
+    "continuous",
+    "near_limit",
+    "given",
+    "given",
+    "sharp",
+    "steep",
+    "anything",
+)
 
 #: What may be given instead of its estimate, and how often it is.
 GIVEN = {
@@ -40,8 +54,9 @@ GIVEN = {
     "structure_frequency": 0.1,
 }
 
-#: A comparison's largest relative difference for well-conditioned cells.  Steps: about ten times what a hundred
-#: thousand cells have shown with the finest steps of `compare`; the other ways round differently, no more.
+#: A comparison's largest relative difference for well-conditioned cells.  Steps: about ten times
+#: what a hundred thousand cells have shown with the finest steps of `compare`; the other ways round
+#: differently, no more.
 FLOORS = {
     "step, rectangle": 5e-2,
     "step, trapezoid": 5e-3,
@@ -50,10 +65,12 @@ FLOORS = {
     "reference": 1e-9,
 }
 
-#: Times as many steps: errors of first order fall to 1/16, of second order and more to 1/16 and less.
+#: Times as many steps: errors of first order fall to 1/16, of second order and more to 1/16 and
+#: less.
 FINER = {"rectangle": 16, "trapezoid": 4, "simpson": 4}
 
-#: Moves of all inputs, relative, that show the conditioning: of the size of the errors of steps, and of roundings.
+#: Moves of all inputs, relative, that show the conditioning: of the size of the errors of steps,
+#: and of roundings.
 SIZES = {
     "step, rectangle": 1e-3,
     "step, trapezoid": 1e-5,
@@ -72,8 +89,8 @@ MOTION = ("permanent_displacement", "peak_relative_velocity")
 class Group:
     """Cells of one sweep: its options, the columns of its cells, and why each is drawn.
 
-    `fastest` is the multiple of the fastest harmonic; steps and histories resolve that.  Of the cell `one` a history
-    is taken and the reference asked.
+    `fastest` is the multiple of the fastest harmonic; steps and histories resolve that.  Of the
+    cell `one` a history is taken and the reference asked.
     """
 
     options: dict[str, Any]
@@ -113,13 +130,17 @@ class Comparison:
 
 
 def _phase(rng: random.Random) -> float:
-    return rng.choice([0.0, 90.0, 180.0, 270.0, rng.uniform(-180.0, 360.0), rng.uniform(0.0, 360.0)])
+    return rng.choice(
+        [0.0, 90.0, 180.0, 270.0, rng.uniform(-180.0, 360.0), rng.uniform(0.0, 360.0)]
+    )
 
 
 def _harmonics(rng: random.Random) -> str:
     count = rng.choice([1, 2, 2, 3, 4])
     multiples = sorted(rng.sample(range(1, rng.choice([4, 8, 20]) + 1), count))
-    return ",".join(f"{rng.choice([-1, 1]) * 10 ** rng.uniform(-1.5, 0)}:{m}:{_phase(rng)}" for m in multiples)
+    return ",".join(
+        f"{rng.choice([-1, 1]) * 10 ** rng.uniform(-1.5, 0)}:{m}:{_phase(rng)}" for m in multiples
+    )
 
 
 def options_of(rng: random.Random) -> dict[str, Any]:
@@ -128,7 +149,9 @@ def options_of(rng: random.Random) -> dict[str, Any]:
     if options["model"] == "mendez":
         options["rise"] = rng.choice(["monotone", "literal"])
         options["recoupling"] = rng.choice(["eq12", "integrate"])
-    options["waveform"] = rng.choice(["sine", "cosine", "cosine", "triangle", "square", *["harmonics"] * 4])
+    options["waveform"] = rng.choice(
+        ["sine", "cosine", "cosine", "triangle", "square", *["harmonics"] * 4]
+    )
     if options["waveform"] == "harmonics":
         options["harmonics"] = _harmonics(rng)
     options["cycles"] = rng.choice([1, 2, 3, 4, 5, 6, 8, 10, 12, 40, 1000])
@@ -140,20 +163,27 @@ def options_of(rng: random.Random) -> dict[str, Any]:
     return options
 
 
-def _cell(rng: random.Random, given: list[str], newmark: bool, g: float) -> tuple[str, dict[str, float]]:
+def _cell(
+    rng: random.Random, given: list[str], newmark: bool, g: float
+) -> tuple[str, dict[str, float]]:
     """A regime, and theta, mu_s, amplitude and what is given of a cell."""
     while True:
         regime = rng.choice(REGIMES)
-        theta, mu_s = rng.choice([0.0, rng.uniform(0.0, 12.0), rng.uniform(0.0, 35.0)]), rng.uniform(0.1, 1.2)
+        theta = rng.choice([0.0, rng.uniform(0.0, 12.0), rng.uniform(0.0, 35.0)])
+        mu_s = rng.uniform(0.1, 1.2)
         if regime == "steep":  # stands by a measured yield acceleration only
             theta = rng.uniform(5.0, 40.0)
             mu_s = rng.uniform(0.2, 1.0) * math.tan(math.radians(theta))
         elif regime == "anything":
-            theta, mu_s = rng.uniform(0.0, 80.0), rng.uniform(0.005, 4.0)
-        tangent, units = math.tan(math.radians(theta)), g / G
+            theta = rng.uniform(0.0, 80.0)
+            mu_s = rng.uniform(0.005, 4.0)
+        tangent = math.tan(math.radians(theta))
+        units = g / G
         onset = coulomb_yield(theta, mu_s) * units
         if "yield_acceleration" in given:
-            share = 10.0 ** rng.uniform(-3.0, -0.7) if regime == "low_yield" else rng.uniform(0.1, 0.95)
+            share = (
+                10.0 ** rng.uniform(-3.0, -0.7) if regime == "low_yield" else rng.uniform(0.1, 0.95)
+            )
             onset = onset * share if onset > 0.0 else rng.uniform(0.01, 8.0) * units
         limit = limiting_acceleration(theta, mu_s, onset / units) * units
         uplift = math.inf if newmark or tangent == 0.0 else g / tangent
@@ -176,10 +206,17 @@ def _cell(rng: random.Random, given: list[str], newmark: bool, g: float) -> tupl
             "yield_acceleration": onset,
             "decay_rate": e_foldings * g / amplitude,
             "delta_mu": rng.choice([0.0, rng.uniform(0.01, 0.4)]),
-            "minimum_friction": rng.choice([rng.uniform(0.01, 1.0) * mu_s, rng.uniform(0.001, 1.0)]),
+            "minimum_friction": rng.choice(
+                [rng.uniform(0.01, 1.0) * mu_s, rng.uniform(0.001, 1.0)]
+            ),
             "structure_frequency": 10.0 ** rng.uniform(-1.0, 2.0),
         }
-        cell = {"theta": theta, "mu_s": mu_s, "amplitude": amplitude, "frequency": 10.0 ** rng.uniform(-1.0, 1.3)}
+        cell = {
+            "theta": theta,
+            "mu_s": mu_s,
+            "amplitude": amplitude,
+            "frequency": 10.0 ** rng.uniform(-1.0, 1.3),
+        }
         return regime, cell | {name: values[name] for name in given}
 
 
@@ -192,7 +229,9 @@ def group_of(seed: int, size: int = 32) -> Group:
     drawn = [_cell(rng, given, options["model"] == "newmark", options["g"]) for _ in range(size)]
     columns = {name: np.array([cell[name] for _, cell in drawn]) for name in drawn[0][1]}
     if rng.random() < 0.15:
-        columns["displacement_amplitude"] = columns.pop("amplitude") / (2.0 * math.pi * columns["frequency"]) ** 2
+        columns["displacement_amplitude"] = (
+            columns.pop("amplitude") / (2.0 * math.pi * columns["frequency"]) ** 2
+        )
     terms = options.get("harmonics", "1:1:0").split(",")
     fastest = max(int(term.split(":")[1]) for term in terms)
     return Group(
@@ -213,7 +252,8 @@ def group_of(seed: int, size: int = 32) -> Group:
 def _sweep(cells: dict[str, Array], options: dict[str, Any]) -> Found:
     """Results of cells; rows of the columns are the dimension before."""
     columns: dict[str, Any] = {
-        name: xr.DataArray(values, dims=("move", "cell")[-values.ndim :]) for name, values in cells.items()
+        name: xr.DataArray(values, dims=("move", "cell")[-values.ndim :])
+        for name, values in cells.items()
     }
     found = slipsweep.sweep(**columns, **choices(**options))
     return {str(name): found[name].to_numpy() for name in found.data_vars}
@@ -222,7 +262,8 @@ def _sweep(cells: dict[str, Array], options: dict[str, Any]) -> Found:
 def exact_of(group: Group, size: float) -> Found:
     """What the cycle solver says of the cells, row 0, and of each with all its inputs moved up or down by `size`."""
     generator = np.random.default_rng(group.seed % 2**32)
-    # any two of the inputs, of which there are eight at most, move in the same direction in half of the moves
+    # any two of the inputs, of which there are eight at most, move in the same direction in half of
+    # the moves
     together = iter(hadamard(MOVES))
     moved = dict(group.cells)
     for name, values in group.cells.items():
@@ -238,14 +279,19 @@ def _outcome(mode: Any, validity: Any) -> tuple[int, int]:
 
 
 def _judged(
-    kind: str, group: Group, exact: Found, j: int, found: dict[str, Any], coarse: dict[str, float] | None = None,
+    kind: str,
+    group: Group,
+    exact: Found,
+    j: int,
+    found: dict[str, Any],
+    coarse: dict[str, float] | None = None,
     **solver: Any,
-) -> Comparison:  # fmt: skip
+) -> Comparison:
     """A cell's results found in another way against the cycle solver's.
 
-    Differences are relative to the result; in continuous mode, where either may cancel, to what the other one comes
-    to over the shaking, or a thousandth of what the plane does, if that is more.  To the bound comes how far the
-    neighbours are.
+    Differences are relative to the result; in continuous mode, where either may cancel, to what the
+    other one comes to over the shaking, or a thousandth of what the plane does, if that is more.
+    To the bound comes how far the neighbours are.
     """
     own = {name: values[0, j] for name, values in exact.items()}
     mode = int(own["sliding_mode"])
@@ -255,21 +301,28 @@ def _judged(
     text = f"seed {group.seed}, {group.regimes[j]}: {text}"
     outcome = _outcome(found["sliding_mode"], found["validity"])
     if outcome not in map(_outcome, exact["sliding_mode"][:, j], exact["validity"][:, j]):
-        return Comparison(kind, group.regimes[j], mode, math.inf, math.inf, f"{text}: mode and validity {outcome}")
+        return Comparison(
+            kind, group.regimes[j], mode, math.inf, math.inf, f"{text}: mode and validity {outcome}"
+        )
     valued = not outcome[1] & VALUELESS
     if valued != all(math.isfinite(found[name]) for name in MOTION):
         return Comparison(kind, group.regimes[j], mode, math.inf, math.inf, f"{text}: {found}")
     if not valued or own["validity"] & VALUELESS:
         return Comparison(kind, group.regimes[j], mode, 0.0, 0.0, text)
-    difference, times = 0.0, 0.0
+    difference = 0.0
+    times = 0.0
     u, v = (abs(float(own[name])) for name in MOTION)
-    period, cycles = 1.0 / float(group.cells["frequency"][j]), group.options["cycles"]
+    period = 1.0 / float(group.cells["frequency"][j])
+    cycles = group.options["cycles"]
     pushed = group.amplitude(j) * period
     nothing = (1e-22 * pushed * period, 1e-22 * pushed)
     scales = max(u, nothing[0]), max(v, nothing[1])
     if mode == CONTINUOUS:
         pushed = 1e-3 * pushed
-        scales = max(u, v * period * cycles, pushed * period * cycles), max(v, u / (period * cycles), pushed)
+        scales = (
+            max(u, v * period * cycles, pushed * period * cycles),
+            max(v, u / (period * cycles), pushed),
+        )
     for name, scale, least in zip(MOTION, scales, nothing, strict=True):
         apart = abs(float(found[name]) - own[name])
         if apart == 0.0:
@@ -289,32 +342,51 @@ def _stepped(group: Group, exact: Found) -> Iterator[Comparison]:
     """The step solver: codes, values, and that finer steps come nearer."""
     options = group.options | {"solver": "step", "rule": group.rule}
     # a lucky count of steps makes no error small
-    runs = [_sweep(group.cells, options | {"steps_per_cycle": group.steps + more}) for more in (0, 44, 92)]
+    runs = [
+        _sweep(group.cells, options | {"steps_per_cycle": group.steps + more})
+        for more in (0, 44, 92)
+    ]
     fine = group.steps * FINER[group.rule]
     found = _sweep(group.cells, options | {"steps_per_cycle": fine})
     for j in range(len(group.regimes)):
-        coarse = {name: max(abs(run[name][j] - exact[name][0, j]) for run in runs) for name in MOTION}
+        coarse = {
+            name: max(abs(run[name][j] - exact[name][0, j]) for run in runs) for name in MOTION
+        }
         own = {name: values[j] for name, values in found.items()}
         yield _judged(
-            f"step, {group.rule}", group, exact, j, own, coarse, solver="step", rule=group.rule, steps_per_cycle=fine
+            f"step, {group.rule}",
+            group,
+            exact,
+            j,
+            own,
+            coarse,
+            solver="step",
+            rule=group.rule,
+            steps_per_cycle=fine,
         )
 
 
 def _histories(group: Group, exact: Found) -> Iterator[Comparison]:
     """`simulate`: its end, and the largest velocity of the samples; of cells that slide on into the next pulse, too."""
     cycles = group.options["cycles"]
-    carried = [j for j in range(len(group.regimes)) if exact["validity"][0, j] & Validity.NOT_RECOUPLED]
+    carried = [
+        j for j in range(len(group.regimes)) if exact["validity"][0, j] & Validity.NOT_RECOUPLED
+    ]
     for j in {group.one, *carried[:2]}:
         arguments = choices(**group.cell(j), **group.options)
-        shaken, spacing = cycles / arguments["frequency"], 1.0 / arguments["frequency"] / (256 * group.fastest)
-        # the largest V comes early, late or again and again; the run-out is over long before the last of the times
+        shaken = cycles / arguments["frequency"]
+        spacing = 1.0 / arguments["frequency"] / (256 * group.fastest)
+        # the largest V comes early, late or again and again; the run-out is over long before the
+        # last of the times
         times = np.arange(min(cycles, 20) * 256 * group.fastest + 1) * spacing
         times = np.union1d(times, shaken - times) if cycles > 20 else times
         history = slipsweep.simulate(**arguments, times=np.append(times, 1e12 * shaken))
         found = {name: history[name].item() for name in ("sliding_mode", "validity")}
         found[MOTION[0]] = history.relative_displacement.to_numpy()[-1]
-        highest, own = history.relative_velocity.to_numpy().max(), exact[MOTION[1]][0, j]
-        # between two samples V may be larger than at either; of a slip that lies between them no sample knows
+        highest = history.relative_velocity.to_numpy().max()
+        own = exact[MOTION[1]][0, j]
+        # between two samples V may be larger than at either; of a slip that lies between them no
+        # sample knows
         ground = history.ground_acceleration.to_numpy()
         relative = np.abs(ground - history.block_acceleration.to_numpy())
         rate = 2.0 * max(relative.max(), np.abs(np.diff(ground)).max())

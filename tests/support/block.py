@@ -13,7 +13,9 @@ from tests.support.sections import Function, Section, root
 class Interface:
     """Friction at the interface and the block's acceleration that follows (Eqs. 2-6)."""
 
-    def __init__(self, g: mpfr, tan_theta: mpfr, mu_s: mpfr, delta_mu: mpfr, decay_rate: mpfr, onset: mpfr) -> None:
+    def __init__(
+        self, g: mpfr, tan_theta: mpfr, mu_s: mpfr, delta_mu: mpfr, decay_rate: mpfr, onset: mpfr
+    ) -> None:
         self.g = g
         self.tan_theta = tan_theta
         self.excess = mu_s - tan_theta
@@ -24,7 +26,9 @@ class Interface:
     def relative_acceleration(self, ground: mpfr, side: int = 1) -> mpfr:
         """Üg − Ü with Ü by Eq. 4; at Üg = 0 as it is on this side of it."""
         friction = self.friction_at_rest * gmpy2.exp(-self.decay * abs(ground))
-        return side * ((self.g + ground * self.tan_theta) * (self.excess - friction) + self.g * self.tan_theta)
+        return side * (
+            (self.g + ground * self.tan_theta) * (self.excess - friction) + self.g * self.tan_theta
+        )
 
     def slope(self, ground: mpfr, side: int = 1) -> mpfr:
         """Derivative of `relative_acceleration`."""
@@ -38,7 +42,8 @@ class Interface:
     def monotone_pieces(self, slope: Function, low: mpfr, high: mpfr) -> list[mpfr]:
         """Ends of the pieces of [low, high], on one side of zero, on which a function of Eq. 4 is monotone.
 
-        The slope of Eq. 4 is itself monotone on either side of one inflection, where n lambda / g = 2 tan(theta).
+        The slope of Eq. 4 is itself monotone on either side of one inflection, where n lambda / g =
+        2 tan(theta).
         """
         cuts = [low, high]
         if self.tan_theta > 0 and self.decay > 0:
@@ -58,7 +63,11 @@ class Interface:
         def value(ground: mpfr) -> mpfr:
             return self.relative_acceleration(ground, side)
 
-        ends = self.monotone_pieces(lambda ground: self.slope(ground, side), low, high) if low < high else []
+        ends = (
+            self.monotone_pieces(lambda ground: self.slope(ground, side), low, high)
+            if low < high
+            else []
+        )
         zeros = [root(value, a, b) for a, b in pairwise(ends) if value(a) * value(b) < 0]
         return sorted(zeros + [x for x in ends[1:-1] if value(x) == 0])
 
@@ -89,7 +98,8 @@ class Block:
         return all(abs(a - b) <= self.rounding for a, b in zip(one, other, strict=True))
 
     def meet_interface(self, interface: Interface, amplitude: mpfr, digits: int) -> None:
-        self.interface, self.onset = interface, interface.yield_acceleration
+        self.interface = interface
+        self.onset = interface.yield_acceleration
         self.rounding = amplitude * mpfr(10) ** -digits
 
     # ------------------------------------------------------------------ motion with a given b
@@ -114,7 +124,9 @@ class Block:
 
     def stop(self, section: Section, low: mpfr, high: mpfr, rate: Function, decay: mpfr) -> mpfr:
         """Where the velocity, which falls from low to high, is zero (Newton kept in its bracket)."""
-        phi, velocity, tiny = low, self.v, (high - low) * mpfr(10) ** (10 - decimals())
+        phi = low
+        velocity = self.v
+        tiny = (high - low) * mpfr(10) ** (10 - decimals())
         while high - low > tiny:
             slope = rate(section.ground(phi))
             new = phi - velocity / slope if slope < 0 else high
@@ -130,7 +142,8 @@ class Block:
 
     def change_speed(self, velocity: mpfr) -> None:
         self.v = velocity
-        self.peak, self.lowest = max(self.peak, velocity), min(self.lowest, velocity)
+        self.peak = max(self.peak, velocity)
+        self.lowest = min(self.lowest, velocity)
 
     def hold(self, section: Section, start: mpfr, end: mpfr) -> mpfr:
         """Slide with b held; where the block stops, or end."""
@@ -146,14 +159,17 @@ class Block:
     def brake(self, span: mpfr) -> None:
         """Eq. 12 until the velocity, of either sign, is zero."""
         time = min(abs(self.v) / self.b, span)
-        slower = self.v - gmpy2.sign(self.v) * self.b * time if time < abs(self.v) / self.b else mpfr(0)
+        slower = (
+            self.v - gmpy2.sign(self.v) * self.b * time if time < abs(self.v) / self.b else mpfr(0)
+        )
         self.u += (self.v + slower) * time / 2
         self.change_speed(slower)
         self.sliding = slower != 0
 
     def follow(self, section: Section) -> None:
         """Continuous sliding: Eq. 4, the velocity of either sign."""
-        side, (low, high) = section.side, sorted((section.first, section.last))
+        side = section.side
+        (low, high) = sorted((section.first, section.last))
 
         def rate(x: mpfr) -> mpfr:
             return self.interface.relative_acceleration(x, side)
@@ -194,7 +210,9 @@ class Block:
             raise NoValueError
 
     def rise(self, section: Section) -> None:
-        interface, low, high = self.interface, max(section.first, mpfr(0)), section.last
+        interface = self.interface
+        low = max(section.first, mpfr(0))
+        high = section.last
         levels = [self.onset]
         if not self.newmark and low < high:
             levels += interface.sign_changes(low, high)
@@ -211,7 +229,8 @@ class Block:
         """What happens as the base comes to x, not falling, on its way to `beyond`."""
         if self.reset and beyond > self.onset:
             self.recoupled_late |= self.v > 0
-            self.reset, self.sliding = False, self.v > 0
+            self.sliding = self.v > 0
+            self.reset = False
             self.b = self.starting(x)
         if not self.sliding and not self.reset:
             self.begin(x, beyond)
@@ -220,8 +239,11 @@ class Block:
 
     def begin(self, x: mpfr, beyond: mpfr) -> None:
         """Begin to slide, if the block at rest does between x and beyond."""
-        if beyond > self.onset and (self.newmark or self.interface.relative_acceleration(beyond) > 0):
-            self.sliding, self.b = True, self.starting(x)
+        if beyond > self.onset and (
+            self.newmark or self.interface.relative_acceleration(beyond) > 0
+        ):
+            self.sliding = True
+            self.b = self.starting(x)
             self.slips += 1
 
     def slide(self, section: Section, a: mpfr, b: mpfr) -> mpfr:
@@ -232,8 +254,12 @@ class Block:
         at_end = self.interface.eq4(section.ground(b)) if not self.newmark else mpfr(0)
         if self.reset or self.newmark or (not self.literal and at_end <= self.b):
             return self.hold(section, a, b)
-        switch, level = a, self.b
-        if not self.literal and self.interface.eq4(section.ground(a)) < level - self.onset * mpfr(10) ** -28:
+        switch = a
+        level = self.b
+        if (
+            not self.literal
+            and self.interface.eq4(section.ground(a)) < level - self.onset * mpfr(10) ** -28
+        ):
             switch = root(lambda phi: self.interface.eq4(section.ground(phi)) - level, a, b)
             at = self.hold(section, a, switch)
             if not self.sliding:

@@ -19,7 +19,17 @@ from slipsweep.motion.waveforms import WAVEFORMS
 DATA = Path(__file__).parents[1] / "data"
 OPTIONAL_INPUTS = ("yield_acceleration", "decay_rate", "delta_mu")
 PARAMETERS = ("theta", "mu_s", "amplitude", "frequency")
-OPTIONS = ("waveform", "harmonics", "ramp_in", "ramp_out", "cycles", "model", "rise", "recoupling", "g")
+OPTIONS = (
+    "waveform",
+    "harmonics",
+    "ramp_in",
+    "ramp_out",
+    "cycles",
+    "model",
+    "rise",
+    "recoupling",
+    "g",
+)
 
 #: Displacement, peak velocity, mode and validity.
 Found = tuple[float, float, int, int]
@@ -29,7 +39,8 @@ Found = tuple[float, float, int, int]
 class Case:
     """A line of a table of tests/data; results as printed, None for what is not given and empty for no value.
 
-    The bounds are of hard cases: how far the answer moves, in m and m/s, and the (mode, validity) within one ulp of it.
+    The bounds are of hard cases: how far the answer moves, in m and m/s, and the (mode, validity)
+    within one ulp of it.
     """
 
     case: int
@@ -82,14 +93,18 @@ class Case:
     @property
     def uplift(self) -> bool:
         """Whether A tan(theta) >= g, where the model gives no value (cases.csv has one such line)."""
-        return self.model == "mendez" and self.amplitude * math.tan(math.radians(self.theta)) >= self.g
+        return (
+            self.model == "mendez" and self.amplitude * math.tan(math.radians(self.theta)) >= self.g
+        )
 
     def missed(self, found: Found, relative: float, absolute: float = 1e-12) -> str:
         """What is wrong with an answer beyond relative |u| + absolute A/omega**2, likewise for v; "" if nothing is."""
         for value, exact, scale in zip(
-            found, (self.permanent_displacement, self.peak_relative_velocity),
-            (self.displacement_scale, self.velocity_scale), strict=False,
-        ):  # fmt: skip
+            found,
+            (self.permanent_displacement, self.peak_relative_velocity),
+            (self.displacement_scale, self.velocity_scale),
+            strict=False,
+        ):
             if not abs(value - float(exact)) <= relative * abs(float(exact)) + absolute * scale:
                 return f"case {self}: {value!r}, not {exact}"
         return ""
@@ -153,7 +168,10 @@ def solve(cases: Iterable[Case], **options: Any) -> dict[int, Found]:
     """The package's answer to each case, by its number; few calls of `sweep`."""
 
     def key(case: Case) -> tuple[Any, ...]:
-        return (*(getattr(case, name) for name in OPTIONS), *(getattr(case, name) is None for name in OPTIONAL_INPUTS))
+        return (
+            *(getattr(case, name) for name in OPTIONS),
+            *(getattr(case, name) is None for name in OPTIONAL_INPUTS),
+        )
 
     found: dict[int, Found] = {}
     for _, alike in groupby(sorted(cases, key=key), key):

@@ -1,8 +1,8 @@
 """Newmark's block in closed form: permanent displacement over A T² of one cycle of each wave, and of a pulse.
 
-r = Üy/A is from 0 to 1.  The block slides while its velocity v is positive: from w = r on at the rate w − r, in units
-of A, to the root of v; w is the wave and s = t/T.  It always stops within the cycle, as ∫ w over the cycle is 0 and v
-would end at −r (1 − s₁) − ∫ w up to the onset s₁.
+r = Üy/A is from 0 to 1.  The block slides while its velocity v is positive: from w = r on at the
+rate w − r, in units of A, to the root of v; w is the wave and s = t/T.  It always stops within the
+cycle, as ∫ w over the cycle is 0 and v would end at −r (1 − s₁) − ∫ w up to the onset s₁.
 """
 
 from mpmath import mp, mpf

@@ -26,7 +26,10 @@ class Ended(NamedTuple):
 def run_command(*arguments: object) -> Ended:
     """Run a command to its end in this process."""
     written = [io.BytesIO(), io.BytesIO()]
-    streams = [io.TextIOWrapper(one, "utf-8", errors="surrogateescape", write_through=True) for one in written]
+    streams = [
+        io.TextIOWrapper(one, "utf-8", errors="surrogateescape", write_through=True)
+        for one in written
+    ]
     words = [str(argument) for argument in arguments]
     with (
         contextlib.redirect_stdout(streams[0]),
@@ -42,7 +45,9 @@ def command(folder: Path, *arguments: object) -> "subprocess.CompletedProcess[st
     """Run a command to its end in `folder`: what `slipsweep` does, without a second of start-up."""
     with working_folder(folder):
         ended = run_command(*arguments)
-    return subprocess.CompletedProcess([*map(str, arguments)], ended.status, ended.output, ended.errors)
+    return subprocess.CompletedProcess(
+        [*map(str, arguments)], ended.status, ended.output, ended.errors
+    )
 
 
 @contextlib.contextmanager

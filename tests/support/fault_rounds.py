@@ -1,7 +1,7 @@
 """Runs that are hurt on the way, for tests/files/test_faults.py and benchmarks/faults.py.
 
-Each round runs the command, hurts it at a random moment, and checks what is left: the output is complete or absent,
-errors are one line, and `--resume` gives the bits of an undisturbed run.
+Each round runs the command, hurts it at a random moment, and checks what is left: the output is
+complete or absent, errors are one line, and `--resume` gives the bits of an undisturbed run.
 """
 
 import multiprocessing
@@ -85,7 +85,9 @@ def start(folder: Path, *arguments: str, cells: int = 25_000, limit: int | None 
     return Started(process, errors)
 
 
-def _run(folder: Path, arguments: Sequence[str], cells: int, limit: int | None, errors: Path) -> None:
+def _run(
+    folder: Path, arguments: Sequence[str], cells: int, limit: int | None, errors: Path
+) -> None:
     from slipsweep.cli import main
     from slipsweep.files import running
 
@@ -126,7 +128,9 @@ def complete_or_absent(folder: Path, output: str, whole: bytes) -> None:
     shutil.rmtree(path) if path.is_dir() else path.unlink()
 
 
-def hurt(folder: Path, output: str, whole: bytes, chance: random.Random, sign: signal.Signals) -> None:
+def hurt(
+    folder: Path, output: str, whole: bytes, chance: random.Random, sign: signal.Signals
+) -> None:
     """Kill a run, or interrupt it, somewhere between its first chunk and its end."""
     process = start(folder, "run", "a.toml", "-o", output, "-q")
     _until(lambda: (folder / f"{output}.part").exists() or process.has_ended)
@@ -138,21 +142,41 @@ def hurt(folder: Path, output: str, whole: bytes, chance: random.Random, sign: s
         kept = any((folder / f"{output}.part").glob("*.chunk"))
         said = r"\d+ of \d+ chunks are kept in .*: --resume goes on" if kept else "nothing written"
         assert re.fullmatch(rf"slipsweep: interrupted; {said}\n", errors), errors
-        assert not kept or "--resume" in start(folder, "run", "a.toml", "-o", output, "-q").finished(2)
+        assert not kept or "--resume" in start(
+            folder, "run", "a.toml", "-o", output, "-q"
+        ).finished(2)
     complete_or_absent(folder, output, whole)
 
 
 def full_disk(folder: Path, output: str, whole: bytes, chance: random.Random) -> None:
     """No room left while chunks are written, on a disk of its own; where none can be had, files may not grow."""
-    output, disk, rest = f"disk/{output}", folder / "disk", chance.randint(0, 200_000)
+    output = f"disk/{output}"
+    disk = folder / "disk"
+    rest = chance.randint(0, 200_000)
     disk.mkdir(exist_ok=True)
     mount = ["mount", "-t", "tmpfs", "-o", "size=64m", "tmpfs", str(disk)]
-    mounted = bool(shutil.which("mount")) and not subprocess.run(mount, capture_output=True, check=False).returncode
+    mounted = (
+        bool(shutil.which("mount"))
+        and not subprocess.run(mount, capture_output=True, check=False).returncode
+    )
     try:
-        process = start(folder, "run", "a.toml", "-o", output, "-q", limit=None if mounted else 2_000 + rest // 2)
+        process = start(
+            folder,
+            "run",
+            "a.toml",
+            "-o",
+            output,
+            "-q",
+            limit=None if mounted else 2_000 + rest // 2,
+        )
         if mounted:
             chunks = chance.randint(1, 12)
-            _until(lambda: len([*(folder / f"{output}.part").glob("*.chunk")]) >= chunks or process.has_ended)
+            _until(
+                lambda: (
+                    len([*(folder / f"{output}.part").glob("*.chunk")]) >= chunks
+                    or process.has_ended
+                )
+            )
             with (disk / "filler").open("wb") as file:
                 for _ in range(20):  # the run takes some of it meanwhile
                     with suppress(OSError):
@@ -174,7 +198,9 @@ def two_runs(folder: Path, output: str, whole: bytes, chance: random.Random) -> 
     second = start(folder, "run", "a.toml", "-o", output, "-q")
     errors = [run.finished(None) for run in (first, second)]
     assert [run.process.exitcode for run in (first, second)].count(0) == 1, errors
-    assert any(word in "".join(errors) for word in ("another", "exists already", "interrupted run")), errors
+    assert any(
+        word in "".join(errors) for word in ("another", "exists already", "interrupted run")
+    ), errors
     complete_or_absent(folder, output, whole)
 
 
@@ -186,7 +212,9 @@ def edited(folder: Path, output: str, whole: bytes, chance: random.Random) -> No
     _signal(process, signal.SIGKILL)
     process.finished(None)
     if (folder / f"{output}.part" / "identity.json").exists():
-        (folder / "a.toml").write_text(SWEEP.replace("stop = 14", f"stop = {chance.randint(5, 13)}"))
+        (folder / "a.toml").write_text(
+            SWEEP.replace("stop = 14", f"stop = {chance.randint(5, 13)}")
+        )
         errors = start(folder, "run", "a.toml", "-o", output, "--resume", "-q").finished(2)
         assert "another sweep file" in errors
         (folder / "a.toml").write_text(SWEEP)
@@ -260,4 +288,6 @@ def _until(condition: Callable[[], bool]) -> None:
 def _children(pid: int) -> list[int]:
     """Processes below a process that run Python's multiprocessing: the workers."""
     children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
-    return [int(one) for one in children if "spawn_main" in Path(f"/proc/{one}/cmdline").read_text()]
+    return [
+        int(one) for one in children if "spawn_main" in Path(f"/proc/{one}/cmdline").read_text()
+    ]

@@ -30,10 +30,19 @@ Category: TypeAlias = Callable[[], Iterator[Cell]]
 
 
 def _cell(theta: float, mu_s: float, amplitude: float, **options: Any) -> Cell:
-    return {"theta": theta, "mu_s": mu_s, "amplitude": float(amplitude), "frequency": 1.0, "cycles": 1, **options}
+    return {
+        "theta": theta,
+        "mu_s": mu_s,
+        "amplitude": float(amplitude),
+        "frequency": 1.0,
+        "cycles": 1,
+        **options,
+    }
 
 
-def _friction(theta: float, mu_s: float, amplitude: float = 1.0, **given: Any) -> reference.FrictionParameters:
+def _friction(
+    theta: float, mu_s: float, amplitude: float = 1.0, **given: Any
+) -> reference.FrictionParameters:
     return reference.friction_parameters(theta, mu_s, amplitude, **given)
 
 
@@ -61,7 +70,13 @@ def mode_limit() -> Iterator[Cell]:
     """A within rounding of Üg,lim: the mode, and with it the answer, may jump."""
     for theta, mu_s in PLANES:
         limit = float(_friction(theta, mu_s).limiting_acceleration)
-        for amplitude in (limit * (1 - 1e-9), _ulps(limit, -1), limit, _ulps(limit, 1), limit * (1 + 1e-9)):
+        for amplitude in (
+            limit * (1 - 1e-9),
+            _ulps(limit, -1),
+            limit,
+            _ulps(limit, 1),
+            limit * (1 + 1e-9),
+        ):
             yield _cell(theta, mu_s, amplitude)
 
 
@@ -74,7 +89,9 @@ def near_failure() -> Iterator[Cell]:
             mu_s = float(tangent * (1 + mpfr(10) ** -k))
             for amplitude in (3 * _friction(theta, mu_s).yield_acceleration, 1.0):
                 yield _cell(theta, mu_s, amplitude, cycles=2)
-        yield _cell(theta, float(tangent * (1 + mpfr(10) ** -9)), 1.0, cycles=2, recoupling="integrate")
+        yield _cell(
+            theta, float(tangent * (1 + mpfr(10) ** -9)), 1.0, cycles=2, recoupling="integrate"
+        )
         yield _cell(theta, float(tangent * (1 + mpfr(10) ** -9)), 1.0, cycles=2, model="newmark")
 
 
@@ -108,7 +125,12 @@ def limit_undefined() -> Iterator[Cell]:
             mu_s = float(highest * (1 - mpfr(10) ** -k))
             onset = float(_friction(theta, mu_s).yield_acceleration)
             uplift = float(G / tangent)
-            yield _cell(theta, mu_s, onset + 0.8 * (uplift - onset) if onset < uplift else 0.9 * uplift, cycles=2)
+            yield _cell(
+                theta,
+                mu_s,
+                onset + 0.8 * (uplift - onset) if onset < uplift else 0.9 * uplift,
+                cycles=2,
+            )
             yield _cell(theta, mu_s, 0.9 * uplift, yield_acceleration=0.3 * uplift, cycles=2)
 
 
@@ -127,8 +149,8 @@ def friction_not_decaying() -> Iterator[Cell]:
         amplitude = limit * (1 + mpfr(10) ** -k) / gmpy2.sqrt(mpfr(1.5))
         yield _cell(0.0, 1.5, amplitude, cycles=2, yield_acceleration=2.0)
         yield _cell(0.0, 1.5, amplitude, cycles=2, yield_acceleration=2.0, model="newmark")
-    # with the default Δμ Eq. 4 holds these blocks back; without it the friction starts from μs, and on a level plane
-    # they slide as soon as it decays at all, which it does up to μs ξ = 1
+    # with the default Δμ Eq. 4 holds these blocks back; without it the friction starts from μs, and
+    # on a level plane they slide as soon as it decays at all, which it does up to μs ξ = 1
     for k in (2, 5, 8, 11, 14):
         for side in (-1, 1):
             amplitude = limit * (1 + side * mpfr(10) ** -k) / mpfr(1.5)
@@ -139,7 +161,11 @@ def sharp_decay() -> Iterator[Cell]:
     """λA/g up to 10⁶: friction gone in a layer of 10⁻⁶ of phase."""
     for k in (2, 3, 4, 5, 6):
         for amplitude, onset in ((3.0, 0.59), (5.1, 0.08), (5.1, 1e-5)):
-            friction = {"yield_acceleration": onset, "decay_rate": 10.0**k * G / amplitude, "delta_mu": 0.1}
+            friction = {
+                "yield_acceleration": onset,
+                "decay_rate": 10.0**k * G / amplitude,
+                "delta_mu": 0.1,
+            }
             yield _cell(5.0, 0.38, amplitude, cycles=2, **friction)
     friction = {"yield_acceleration": 1e-5, "decay_rate": 1e6 * G / 3.0, "delta_mu": 0.1}
     yield _cell(5.0, 0.38, 3.0, **friction)
@@ -148,22 +174,33 @@ def sharp_decay() -> Iterator[Cell]:
 
 def tangential_onset() -> Iterator[Cell]:
     """Eq. 4 touches Üg: a double root, or none; the slide shrinks to a point."""
-    # D(x) = x − Eq. 4 vanishes where μs + Δμ = F(x) = e^(λx/g) (μs − tan θ + g tan θ / n).  On a plane
-    # steeper than friction holds, F has a maximum: there Eq. 4 touches Üg from above.
-    theta, mu_s, onset, amplitude = 20.0, 0.2, 1.3 * G, 1.4 * G
+    # D(x) = x − Eq. 4 vanishes where μs + Δμ = F(x) = e^(λx/g) (μs − tan θ + g tan θ / n).  On a
+    # plane steeper than friction holds, F has a maximum: there Eq. 4 touches Üg from above.
+    theta = 20.0
+    mu_s = 0.2
+    onset = 1.3 * G
+    amplitude = 1.4 * G
     given = {"yield_acceleration": onset}
     with workdps(60):
-        tangent, g = gmpy2.tan(gmpy2.radians(mpfr(theta))), mpfr(G)
-        excess, touching = mu_s - tangent, mpfr("1.5")  # n/g at the maximum
+        tangent = gmpy2.tan(gmpy2.radians(mpfr(theta)))
+        g = mpfr(G)
+        # n/g at the maximum
+        excess = mu_s - tangent
+        touching = mpfr("1.5")
         rate = tangent**2 / (touching * (touching * excess + tangent))
         given["decay_rate"] = float(rate)
         x = (touching - 1) * g / tangent
         level = gmpy2.exp(float(rate) * x / g) * (excess + tangent / touching) - mu_s
         for k in (2, 4, 6, 8, 10, 12):
-            yield _cell(theta, mu_s, amplitude, **given, delta_mu=float(level * (1 - mpfr(10) ** -k)))
+            yield _cell(
+                theta, mu_s, amplitude, **given, delta_mu=float(level * (1 - mpfr(10) ** -k))
+            )
         yield _cell(theta, mu_s, amplitude, **given, delta_mu=float(level * (1 + mpfr(10) ** -12)))
         # or Eq. 4 falls to Üg at the very peak
-        theta, mu_s, amplitude, rate = 5.0, 0.38, 3.0, mpfr(4)
+        theta = 5.0
+        mu_s = 0.38
+        amplitude = 3.0
+        rate = mpfr(4)
         tangent = gmpy2.tan(gmpy2.radians(mpfr(theta)))
         n = g + amplitude * tangent
         level = gmpy2.exp(rate * amplitude / g) * (mu_s - tangent + g * tangent / n) - mu_s
@@ -185,14 +222,21 @@ def restick() -> Iterator[Cell]:
 
 def stop_at_next_onset() -> Iterator[Cell]:
     """V reaches 0 just as the next slide begins."""
-    for theta, mu_s, model in ((18.0, 0.34, "mendez"), (5.0, 0.12, "mendez"), (10.0, 0.2, "mendez")):
+    for theta, mu_s, model in (
+        (18.0, 0.34, "mendez"),
+        (5.0, 0.12, "mendez"),
+        (10.0, 0.2, "mendez"),
+    ):
         onset = float(_friction(theta, mu_s).yield_acceleration)
-        low, high = onset, float(_friction(theta, mu_s).limiting_acceleration)
+        low = onset
+        high = float(_friction(theta, mu_s).limiting_acceleration)
         if reference.solve(**_cell(theta, mu_s, high, cycles=2, model=model)).recoupled:
             continue
         while _ulps(low, 1) < high:
             middle = 0.5 * (low + high)
-            recoupled = reference.solve(**_cell(theta, mu_s, middle, cycles=2, model=model)).recoupled
+            recoupled = reference.solve(
+                **_cell(theta, mu_s, middle, cycles=2, model=model)
+            ).recoupled
             low, high = (middle, high) if recoupled else (low, middle)
         for amplitude in (low * (1 - 1e-9), low, high, high * (1 + 1e-9)):
             yield _cell(theta, mu_s, amplitude, cycles=3, model=model)
@@ -200,19 +244,31 @@ def stop_at_next_onset() -> Iterator[Cell]:
 
 def vanishing_kd() -> Iterator[Cell]:
     """Kd → 0 under the literal rise: u = v²/(2b) grows without bound."""
-    theta, mu_s, amplitude, rate = 5.0, 0.38, 1.5, 4.0
+    theta = 5.0
+    mu_s = 0.38
+    amplitude = 1.5
+    rate = 4.0
     with workdps(60):
-        tangent, g = gmpy2.tan(gmpy2.radians(mpfr(theta))), mpfr(G)
+        tangent = gmpy2.tan(gmpy2.radians(mpfr(theta)))
+        g = mpfr(G)
         n = g + amplitude * tangent
         for k in (1, 3, 6, 9, 12):
             friction = mu_s - tangent - (amplitude * (1 - mpfr(10) ** -k) - g * tangent) / n
-            given = {"decay_rate": rate, "delta_mu": float(friction * gmpy2.exp(rate * amplitude / g) - mu_s)}
+            given = {
+                "decay_rate": rate,
+                "delta_mu": float(friction * gmpy2.exp(rate * amplitude / g) - mu_s),
+            }
             yield _cell(theta, mu_s, amplitude, yield_acceleration=0.59, rise="literal", **given)
 
 
 def many_cycles() -> Iterator[Cell]:
     """10⁶ cycles: rounding adds up, or a loop takes for ever."""
-    for theta, mu_s, amplitude in ((5.0, 0.38, 3.55), (6.0, 0.38, 5.1), (0.0, 0.5, 11.0), (18.0, 0.34, 2.0)):
+    for theta, mu_s, amplitude in (
+        (5.0, 0.38, 3.55),
+        (6.0, 0.38, 5.1),
+        (0.0, 0.5, 11.0),
+        (18.0, 0.34, 2.0),
+    ):
         for model in ("mendez", "newmark"):
             yield _cell(theta, mu_s, amplitude, cycles=10**6, model=model)
     yield _cell(6.0, 0.38, 5.1, cycles=10**6, yield_acceleration=0.08)
@@ -274,14 +330,20 @@ def neighbours(cell: Cell) -> Iterator[Cell]:
         if isinstance(value, float):
             for toward in (-math.inf, math.inf):
                 moved = math.nextafter(value, toward)
-                if name == "yield_acceleration" or moved > 0 or (moved == 0 and name in ("theta", "amplitude")):
+                if (
+                    name == "yield_acceleration"
+                    or moved > 0
+                    or (moved == 0 and name in ("theta", "amplitude"))
+                ):
                     yield {**cell, name: moved}
 
 
 def bound_of(value: mpfr, others: Iterable[mpfr], dtype: str = "float64") -> mpfr:
     """How far a result is from those of its neighbours that have one, plus half an ulp of its own."""
     moves = [abs(other - value) for other in others if not gmpy2.is_nan(other)]
-    return max(moves, default=mpfr(0)) + mpfr(float(np.spacing(np.dtype(dtype).type(abs(value))))) / 2
+    return (
+        max(moves, default=mpfr(0)) + mpfr(float(np.spacing(np.dtype(dtype).type(abs(value))))) / 2
+    )
 
 
 def conditioning(cell: Cell, dtype: str = "float64") -> dict[str, str]:

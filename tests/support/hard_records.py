@@ -1,6 +1,7 @@
 """Hard records: where the response to a recorded motion is hardest to solve, why, and what one ulp of the input does.
 
-`CATEGORIES` makes the cells of Newmark's block; `conditioning` is its response, and how far that moves.
+`CATEGORIES` makes the cells of Newmark's block; `conditioning` is its response, and how far that
+moves.
 """
 
 import math
@@ -41,7 +42,14 @@ def solve(cell: Cell) -> RecordSolution:
         if times is None:
             times = [mpfr(cell.interval) * i for i in range(cell.samples.size)]
         return solve_record(
-            times, cell.samples, 0.0, 0.5, scale=cell.scale, model="newmark", yield_acceleration=cell.onset, dps=30
+            times,
+            cell.samples,
+            0.0,
+            0.5,
+            scale=cell.scale,
+            model="newmark",
+            yield_acceleration=cell.onset,
+            dps=30,
         )
 
 
@@ -50,7 +58,9 @@ def neighbours(cell: Cell) -> Iterator[Cell]:
     for toward in (-math.inf, math.inf):
         yield replace(cell, onset=math.nextafter(cell.onset, toward))
         yield replace(cell, scale=math.nextafter(cell.scale, toward))
-        yield replace(cell, samples=np.nextafter(cell.samples, np.where(cell.samples == 0.0, 0.0, toward)))
+        yield replace(
+            cell, samples=np.nextafter(cell.samples, np.where(cell.samples == 0.0, 0.0, toward))
+        )
         if cell.times is None:
             yield replace(cell, interval=math.nextafter(cell.interval, toward))
         else:
@@ -60,10 +70,17 @@ def neighbours(cell: Cell) -> Iterator[Cell]:
 
 def conditioning(cell: Cell) -> tuple[RecordSolution, mpfr, mpfr]:
     """The exact response, and how far displacement and peak velocity move: plus half an ulp of their own."""
-    own, others = solve(cell), [solve(other) for other in neighbours(cell)]
+    own = solve(cell)
+    others = [solve(other) for other in neighbours(cell)]
     with workdps(60):
-        displacement = bound_of(own.permanent_displacement, (other.permanent_displacement for other in others))
-        return own, displacement, bound_of(own.peak_relative_velocity, (o.peak_relative_velocity for o in others))
+        displacement = bound_of(
+            own.permanent_displacement, (other.permanent_displacement for other in others)
+        )
+        return (
+            own,
+            displacement,
+            bound_of(own.peak_relative_velocity, (o.peak_relative_velocity for o in others)),
+        )
 
 
 # ------------------------------------------------------------------------------------- cells
@@ -71,8 +88,11 @@ def conditioning(cell: Cell) -> tuple[RecordSolution, mpfr, mpfr]:
 
 def _noise(seed: int, count: int, coarse: int = 1) -> Floats:
     """Samples of a band of frequencies under an envelope, from 0 to 0, of peak 1."""
-    rng, at = np.random.default_rng(seed), np.linspace(0.0, 1.0, count)
-    waves = np.sin(2.0 * np.pi * (np.arange(2, 14)[:, None] / coarse * at + rng.uniform(size=(12, 1)))).sum(axis=0)
+    rng = np.random.default_rng(seed)
+    at = np.linspace(0.0, 1.0, count)
+    waves = np.sin(
+        2.0 * np.pi * (np.arange(2, 14)[:, None] / coarse * at + rng.uniform(size=(12, 1)))
+    ).sum(axis=0)
     shaped = np.asarray(waves * np.sin(np.pi * at) ** 2)
     return shaped / float(np.abs(shaped).max())
 
@@ -93,7 +113,8 @@ def peak_just_above() -> Iterator[Cell]:
         samples = _noise(100 + seed, 40)
         peak = float(samples.max())
         if peak < 0.9:
-            samples, peak = -samples, float(-samples.min())
+            peak = float(-samples.min())
+            samples = -samples
         for ulps in (1, 2, 1000):
             yield Cell(samples, peak - ulps * float(np.spacing(peak) / 2.0), interval=0.01)
 
@@ -104,8 +125,16 @@ def plateaus() -> Iterator[Cell]:
         for above in (0.0, 1e-15, 1e-8, 1e-2):
             high = onset * (1.0 + above)
             yield Cell(np.array([0.0, high, high, high, 0.0, -0.2, 0.0]), onset, interval=0.05)
-            yield Cell(np.array([0.0, 2 * onset, onset, onset, high, 0.0, 0.0, high, 0.0]), onset, interval=0.05)
-            yield Cell(np.array([high, high, 0.0, onset, onset, 3 * onset, onset, 0.0]), onset, interval=0.05)
+            yield Cell(
+                np.array([0.0, 2 * onset, onset, onset, high, 0.0, 0.0, high, 0.0]),
+                onset,
+                interval=0.05,
+            )
+            yield Cell(
+                np.array([high, high, 0.0, onset, onset, 3 * onset, onset, 0.0]),
+                onset,
+                interval=0.05,
+            )
 
 
 def duplicated_zeros() -> Iterator[Cell]:
@@ -114,9 +143,15 @@ def duplicated_zeros() -> Iterator[Cell]:
         rest = [0.0] * gap
         for onset in (0.2, 0.5, 0.99):
             yield Cell(
-                np.array([*rest, 1.0, *rest, 1.0, *rest, -1.0, *rest, 1.0, -0.3, 1.0, *rest]), onset, interval=0.1
+                np.array([*rest, 1.0, *rest, 1.0, *rest, -1.0, *rest, 1.0, -0.3, 1.0, *rest]),
+                onset,
+                interval=0.1,
             )
-            yield Cell(np.array([0.0, 1e-300, 0.0, -0.0, 1.0, 0.0, 5e-324, 0.0, 0.7, -1.0, 0.0]), onset, interval=0.1)
+            yield Cell(
+                np.array([0.0, 1e-300, 0.0, -0.0, 1.0, 0.0, 5e-324, 0.0, 0.7, -1.0, 0.0]),
+                onset,
+                interval=0.1,
+            )
 
 
 def many_small_slips() -> Iterator[Cell]:
@@ -166,7 +201,11 @@ def stop_at_a_sample() -> Iterator[Cell]:
             yield Cell(fall, onset, interval=0.25)
             for wait in range(1, 5):
                 again = [0.0] * wait
-                yield Cell(np.array([0.0, level, *again, onset, level, 0.0, -onset, 0.0]), onset, interval=0.25)
+                yield Cell(
+                    np.array([0.0, level, *again, onset, level, 0.0, -onset, 0.0]),
+                    onset,
+                    interval=0.25,
+                )
 
 
 CATEGORIES: tuple[Category, ...] = (

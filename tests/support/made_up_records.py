@@ -1,6 +1,7 @@
 """Records of a few dozen samples in which much happens: plateaus, zeros touched, peaks of one height.
 
-`tests/kernels/test_record.py` holds the solver to the reference on some, ``python -m benchmarks.agreement`` on many.
+`tests/kernels/test_record.py` holds the solver to the reference on some, ``python -m
+benchmarks.agreement`` on many.
 """
 
 import math
@@ -17,7 +18,8 @@ from tests.support.reference import solve_record
 #: Accelerations that meet each other.
 LEVELS = (0.0, 0.0, 0.53, 1.03, 2.07, 3.1, 4.1, 5.03, 6.55)
 
-#: What no difference exceeds, some ten times what a thousand have shown; of displacements of 1e-9 m, 1e-19 m.
+#: What no difference exceeds, some ten times what a thousand have shown; of displacements of 1e-9
+#: m, 1e-19 m.
 SEEN = 1e-10
 
 
@@ -41,26 +43,37 @@ def made(seed: int) -> Made:
     elif kind == "walk":
         values = np.clip(np.cumsum(rng.normal(0.0, 2.0, count)), -7.0, 7.0)
     else:
-        values = 6.0 * np.sin(np.arange(count) * rng.uniform(0.2, 2.0)) * rng.uniform(0.2, 1.0, count)
+        values = (
+            6.0 * np.sin(np.arange(count) * rng.uniform(0.2, 2.0)) * rng.uniform(0.2, 1.0, count)
+        )
     drawn = {
         "yield_acceleration": (0.7, 10 ** rng.uniform(-2.0, 0.6)),
         "decay_rate": (0.5, 10 ** rng.uniform(-1.0, 2.0)),
         "delta_mu": (0.5, rng.choice([0.0, rng.uniform(0.0, 0.4)])),
     }
-    given: dict[str, Any] = {name: float(value) for name, (share, value) in drawn.items() if rng.random() < share}
+    given: dict[str, Any] = {
+        name: float(value) for name, (share, value) in drawn.items() if rng.random() < share
+    }
     given["recoupling"] = str(rng.choice(["eq12", "integrate"]))
     given["rise"] = str(rng.choice(["monotone", "literal"]))
-    theta, mu_s = float(rng.choice([0.0, rng.uniform(0.0, 25.0)])), float(rng.uniform(0.1, 1.0))
+    theta = float(rng.choice([0.0, rng.uniform(0.0, 25.0)]))
+    mu_s = float(rng.uniform(0.1, 1.0))
     return Made(Record.sampled(values, float(rng.choice([0.02, 0.05, 0.1]))), theta, mu_s, given)
 
 
 def difference(one: Made) -> float:
     """The worst relative difference from the reference; infinite where flags differ."""
     found = sweep(one.theta, one.mu_s, **choices(**one.given, excitation=one.record))
-    expected = vars(solve_record(one.record.times, one.record.acceleration, one.theta, one.mu_s, **one.given))
+    expected = vars(
+        solve_record(one.record.times, one.record.acceleration, one.theta, one.mu_s, **one.given)
+    )
     valueless = int(VALUELESS) & expected["validity"]
     seen = valueless or 2047  # other flags of a block without a value say nothing
     if (int(found.validity) ^ expected.pop("validity")) & seen:
         return math.inf
     pairs = [(found[name].item(), float(value)) for name, value in expected.items()]
-    return 0.0 if valueless else max(abs(value - exact) / max(abs(exact), 1e-9) for value, exact in pairs)
+    return (
+        0.0
+        if valueless
+        else max(abs(value - exact) / max(abs(exact), 1e-9) for value, exact in pairs)
+    )

@@ -1,9 +1,10 @@
 """The motion rules in multiple precision, for every waveform and every record: nothing is shared with the solvers.
 
-The shaking is cut into sections on which Üg is smooth, monotone and of one sign.  Every event (onset, switch between
-Eq. 4 and the held value, stop) is a bracketed root of its own condition, every integral a Gauss-Legendre rule over
-parts that are short against the waves and against the decay of the friction.  Time is the phase φ = ωt under a
-waveform, where V = ωv and W = ω²u, and the time itself under a record.
+The shaking is cut into sections on which Üg is smooth, monotone and of one sign.  Every event
+(onset, switch between Eq. 4 and the held value, stop) is a bracketed root of its own condition,
+every integral a Gauss-Legendre rule over parts that are short against the waves and against the
+decay of the friction.  Time is the phase φ = ωt under a waveform, where V = ωv and W = ω²u, and the
+time itself under a record.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -19,7 +20,10 @@ from tests.support.sections import Section, Waveform, sections_of_record
 
 Number: TypeAlias = float | int | str | mpfr
 
-MISSING, STUCK, STICK_SLIP, CONTINUOUS = -1, 0, 1, 2
+MISSING = -1
+STUCK = 0
+STICK_SLIP = 1
+CONTINUOUS = 2
 
 # the bits of `validity` (docs/model.md)
 STATICALLY_UNSTABLE = 1
@@ -52,7 +56,9 @@ class FrictionParameters:
     validity: int
 
     def interface(self, g: mpfr, tan_theta: mpfr, mu_s: mpfr) -> Interface:
-        return Interface(g, tan_theta, mu_s, self.delta_mu, self.decay_rate, self.yield_acceleration)
+        return Interface(
+            g, tan_theta, mu_s, self.delta_mu, self.decay_rate, self.yield_acceleration
+        )
 
 
 @dataclass(frozen=True)
@@ -99,7 +105,10 @@ def friction_parameters(
 ) -> FrictionParameters:
     """Friction parameters of one cell (Eqs. 7-11), `theta` in degrees, the rest in SI units."""
     with workdps(dps + GUARD_DIGITS):
-        tan_theta, static, peak, gravity = gmpy2.tan(gmpy2.radians(mpfr(theta))), mpfr(mu_s), mpfr(amplitude), mpfr(g)
+        tan_theta = gmpy2.tan(gmpy2.radians(mpfr(theta)))
+        static = mpfr(mu_s)
+        peak = mpfr(amplitude)
+        gravity = mpfr(g)
         onset = gravity * (static - tan_theta) / (1 + static * tan_theta)
         onset = onset if yield_acceleration is None else mpfr(yield_acceleration)
         validity = STATICALLY_UNSTABLE * (onset <= 0)
@@ -110,10 +119,16 @@ def friction_parameters(
         least = mpfr("0.01") if continuous else static**2 * ratio
         least = least if minimum_friction is None else mpfr(minimum_friction)
         inverse = 1 / ratio if ratio != 0 else gmpy2.inf()
-        excess = static * ((ratio if continuous else inverse) - 1) if delta_mu is None else mpfr(delta_mu)
+        excess = (
+            static * ((ratio if continuous else inverse) - 1)
+            if delta_mu is None
+            else mpfr(delta_mu)
+        )
         decays = (static + excess) / least if least != 0 else gmpy2.inf()
         if model != "newmark":
-            validity |= UPLIFT * (peak * tan_theta >= gravity) | LIMIT_UNDEFINED * (denominator <= 0)
+            validity |= UPLIFT * (peak * tan_theta >= gravity) | LIMIT_UNDEFINED * (
+                denominator <= 0
+            )
             if decay_rate is None and not validity & (STATICALLY_UNSTABLE | LIMIT_UNDEFINED):
                 validity |= FRICTION_NOT_DECAYING * (decays <= 1)
         rate = gmpy2.nan() if decay_rate is None else mpfr(decay_rate)
@@ -130,7 +145,9 @@ def _remarks(ratio: mpfr, upslope: bool, below: bool, model: str, given: dict[st
         return UPSLOPE * upslope
     estimated = given.get("decay_rate") is None or given.get("delta_mu") is None
     near = bool(0.9 <= ratio <= 1.1)
-    return UPSLOPE * upslope | NEAR_MODE_LIMIT * near | FRICTION_ESTIMATED * (estimated and not below)
+    return (
+        UPSLOPE * upslope | NEAR_MODE_LIMIT * near | FRICTION_ESTIMATED * (estimated and not below)
+    )
 
 
 def _yield_governs(block: Block, rises: Iterable[tuple[mpfr, mpfr]]) -> bool:
@@ -140,7 +157,9 @@ def _yield_governs(block: Block, rises: Iterable[tuple[mpfr, mpfr]]) -> bool:
         x
         for low, high in rises
         if high > block.onset
-        for x in interface.monotone_pieces(lambda x: 1 - interface.slope(x), max(low, block.onset), high)
+        for x in interface.monotone_pieces(
+            lambda x: 1 - interface.slope(x), max(low, block.onset), high
+        )
     ]
     limit = block.onset * (1 + mpfr(10) ** -25)
     return bool(values) and (block.newmark or all(interface.eq4(x) <= limit for x in values))
@@ -161,13 +180,16 @@ def _cycles(block: Block, wave: Waveform, amplitude: mpfr, is_continuous: bool) 
     """The motion through all cycles, those alike passed over; the sections of the cycles that differ."""
     shaking: list[Section] = []
     seen: list[tuple[tuple[Any, ...], int, mpfr]] = []
-    n, highest = 0, mpfr(0)
+    n = 0
+    highest = mpfr(0)
     while n < wave.cycles:
         sections = list(wave.sections(n, amplitude))
         alike = wave.alike(n) - 1
         if not alike or not seen:
             shaking += sections
-        before, start, u = block.state(), n, block.u
+        before = block.state()
+        start = n
+        u = block.u
         block.peak = block.lowest = block.v
         for section in sections:
             if not is_continuous:
@@ -184,7 +206,9 @@ def _cycles(block: Block, wave: Waveform, amplitude: mpfr, is_continuous: bool) 
                 # the next ones differ by a velocity that is added
                 if gain < 0 and not is_continuous:
                     alike = min(alike, max(0, int(gmpy2.floor(-block.lowest / gain)) - 1))
-                block.u += alike * (block.u - u) + 2 * gmpy2.const_pi() * gain * alike * (alike + 1) / 2
+                block.u += (
+                    alike * (block.u - u) + 2 * gmpy2.const_pi() * gain * alike * (alike + 1) / 2
+                )
                 block.peak += max(gain, 0) * alike
                 block.v += gain * alike
                 n += alike
@@ -221,14 +245,19 @@ def solve(
 ) -> Solution:
     """Response of one cell to a waveform, to `dps` digits; floats are taken at their exact binary value.
 
-    Arguments are those of `slipsweep.sweep`; `harmonics` are "amplitude:multiple:phase in degrees, ...", `given` as in
-    `friction_parameters`.  Displacement is in m, velocity in m/s; NaN where `validity` says that there is no value.
+    Arguments are those of `slipsweep.sweep`; `harmonics` are "amplitude:multiple:phase in degrees,
+    ...", `given` as in `friction_parameters`.  Displacement is in m, velocity in m/s; NaN where
+    `validity` says that there is no value.
     """
     with workdps(dps + GUARD_DIGITS):
         parameters = friction_parameters(theta, mu_s, amplitude, model=model, g=g, dps=dps, **given)
-        validity, mode, peak = parameters.validity, parameters.sliding_mode, mpfr(amplitude)
+        validity = parameters.validity
+        mode = parameters.sliding_mode
+        peak = mpfr(amplitude)
         if structure_frequency is not None:
-            in_band = 0.2 <= float(frequency) / float(structure_frequency) <= 1.3  # in doubles: 1/5 is 0.2
+            in_band = (
+                0.2 <= float(frequency) / float(structure_frequency) <= 1.3
+            )  # in doubles: 1/5 is 0.2
             validity |= FLEXIBLE_BLOCK * in_band
         if mode == MISSING:
             return Solution(gmpy2.nan(), gmpy2.nan(), MISSING, validity)
@@ -248,17 +277,28 @@ def solve(
             shaking = [section for n in range(cycles) for section in wave.sections(n, peak)]
             below = _yield_governs(block, _rises(shaking, block.rounding))
             return Solution(
-                gmpy2.nan(), gmpy2.nan(), MISSING, validity | KD_NOT_POSITIVE | YIELD_GOVERNS * below, False, below
+                gmpy2.nan(),
+                gmpy2.nan(),
+                MISSING,
+                validity | KD_NOT_POSITIVE | YIELD_GOVERNS * below,
+                False,
+                below,
             )
-        validity |= YIELD_GOVERNS * (below and not block.newmark) | NOT_RECOUPLED * block.recoupled_late
+        validity |= (
+            YIELD_GOVERNS * (below and not block.newmark) | NOT_RECOUPLED * block.recoupled_late
+        )
         if any(max(section.first, section.last) > block.onset for section in shaking):
             # ramps may keep the shaking below its peak, and the block from sliding
-            validity |= _remarks(parameters.acceleration_ratio, block.u < -block.rounding, below, model, given)
-        omega, recoupled = 2 * gmpy2.const_pi() * mpfr(frequency), mode == STICK_SLIP and not block.recoupled_late
+            validity |= _remarks(
+                parameters.acceleration_ratio, block.u < -block.rounding, below, model, given
+            )
+        omega = 2 * gmpy2.const_pi() * mpfr(frequency)
+        recoupled = mode == STICK_SLIP and not block.recoupled_late
         return Solution(block.u / omega**2, block.peak / omega, mode, validity, recoupled, below)
 
 
-# --------------------------------------------------------------------------------------------- records
+# ---------------------------------------------------------------------------------------------
+# records
 
 
 def _half_waves(sections: Sequence[Section]) -> Iterator[tuple[int, int, mpfr]]:
@@ -266,17 +306,22 @@ def _half_waves(sections: Sequence[Section]) -> Iterator[tuple[int, int, mpfr]]:
     start = None
     for i in range(len(sections) + 1):
         above = i < len(sections) and sections[i].side > 0
-        if start is not None and not (above and sections[i].first > 0):  # to touch zero ends a half wave
+        if start is not None and not (
+            above and sections[i].first > 0
+        ):  # to touch zero ends a half wave
             yield start, i, max(max(section.first, section.last) for section in sections[start:i])
             start = None
         if above and start is None:
             start = i
 
 
-def _cut_at_onsets(sections: list[Section], onset: mpfr) -> tuple[list[Section], list[tuple[int, int, mpfr]]]:
+def _cut_at_onsets(
+    sections: list[Section], onset: mpfr
+) -> tuple[list[Section], list[tuple[int, int, mpfr]]]:
     """Sections cut where half waves first reach `onset`; first and last (exclusive) ones of these pulses, and peaks."""
     found: list[Section] = []
-    pulses, done = [], 0
+    pulses = []
+    done = 0
     for start, end, peak in _half_waves(sections):
         if peak <= onset:
             continue
@@ -288,7 +333,8 @@ def _cut_at_onsets(sections: list[Section], onset: mpfr) -> tuple[list[Section],
             found.append(replace(sections[i], end=second.start, last=onset))
             sections[i] = second
         pulses.append((len(found), len(found) + end - i, peak))
-        found, done = found + sections[i:end], end
+        found = found + sections[i:end]
+        done = end
     return found + sections[done:], pulses
 
 
@@ -310,7 +356,8 @@ def solve_record(
     with workdps(dps + GUARD_DIGITS):
         values = [mpfr(scale) * mpfr(float(a)) for a in acceleration]
         sections = sections_of_record(times, values)
-        block, tan_theta = Block(model, rise, recoupling, True), gmpy2.tan(gmpy2.radians(mpfr(theta)))
+        block = Block(model, rise, recoupling, True)
+        tan_theta = gmpy2.tan(gmpy2.radians(mpfr(theta)))
 
         def friction(peak: mpfr) -> FrictionParameters:
             return friction_parameters(theta, mu_s, peak, model=model, g=g, dps=dps, **given)
@@ -324,14 +371,23 @@ def solve_record(
         ends = [*(begin for begin, _, _ in pulses[1:]), len(sections)]
         for (begin, end, peak), following in zip(pulses, ends, strict=False):
             parameters = friction(peak)
-            mode = CONTINUOUS if parameters.acceleration_ratio > 1 and not block.newmark else STICK_SLIP
+            mode = (
+                CONTINUOUS
+                if parameters.acceleration_ratio > 1 and not block.newmark
+                else STICK_SLIP
+            )
             validity |= parameters.validity & ~UPLIFT  # which the record itself tells
-            validity |= NOT_RECOUPLED * bool(block.v > 0 and not block.newmark and modes and modes[-1] == STICK_SLIP)
+            validity |= NOT_RECOUPLED * bool(
+                block.v > 0 and not block.newmark and modes and modes[-1] == STICK_SLIP
+            )
             if validity & (STATICALLY_UNSTABLE | UPLIFT | LIMIT_UNDEFINED | FRICTION_NOT_DECAYING):
                 return RecordSolution(gmpy2.nan(), gmpy2.nan(), -1, -1, -1, validity)
-            block.meet_interface(parameters.interface(mpfr(g), tan_theta, mpfr(mu_s)), peak, dps + 10)
+            block.meet_interface(
+                parameters.interface(mpfr(g), tan_theta, mpfr(mu_s)), peak, dps + 10
+            )
             modes.append(mode)
-            pulse, after = sections[begin:end], sections[end:following]
+            pulse = sections[begin:end]
+            after = sections[end:following]
             below = mode == STICK_SLIP and _yield_governs(block, [(onset, peak)])
             validity |= YIELD_GOVERNS * (below and not block.newmark)
             validity |= _remarks(parameters.acceleration_ratio, False, below, model, given)
@@ -340,8 +396,12 @@ def solve_record(
                 continue
             _stick_and_slip(block, pulse)
             # there is a value if b > 0 at the end of the last rise
-            if (block.sliding and block.b <= 0) or (block.literal and block.interface.eq4(peak) <= 0):
-                return RecordSolution(gmpy2.nan(), gmpy2.nan(), -1, -1, -1, validity | KD_NOT_POSITIVE)
+            if (block.sliding and block.b <= 0) or (
+                block.literal and block.interface.eq4(peak) <= 0
+            ):
+                return RecordSolution(
+                    gmpy2.nan(), gmpy2.nan(), -1, -1, -1, validity | KD_NOT_POSITIVE
+                )
             for section in after:
                 block.take(section)
         if block.v != 0:
@@ -353,13 +413,16 @@ def solve_record(
 
 def _stick_and_slip(block: Block, pulse: list[Section]) -> None:
     block.v = max(block.v, mpfr(0))
-    block.sliding, block.reset = block.v > 0, True
+    block.sliding = block.v > 0
+    block.reset = True
     for section in pulse:
         block.take(section)
     block.reset = True  # also where Üg only touches zero
 
 
-def _slide(block: Block, pulse: list[Section], after: list[Section], another: bool, peak: mpfr) -> None:
+def _slide(
+    block: Block, pulse: list[Section], after: list[Section], another: bool, peak: mpfr
+) -> None:
     """A continuous pulse and the negative half wave that follows; up to the next pulse if that follows at once."""
     block.slips += block.v == 0
     bottom = 0
@@ -369,7 +432,8 @@ def _slide(block: Block, pulse: list[Section], after: list[Section], another: bo
             break
     way_up = after[bottom:]
     at_once = another and all(
-        one.first >= 0 and one.last > 0 and (i == 0 or one.first > 0) for i, one in enumerate(way_up)
+        one.first >= 0 and one.last > 0 and (i == 0 or one.first > 0)
+        for i, one in enumerate(way_up)
     )
     for section in [*pulse, *after[: len(after) if at_once else bottom]]:
         block.follow(section)

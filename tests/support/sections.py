@@ -31,8 +31,10 @@ def _gauss_legendre(count: int, digits: int) -> list[tuple[mpfr, mpfr]]:
 
 def root(f: Function, low: mpfr, high: mpfr) -> mpfr:
     """Root of `f` in a bracket: bisection made faster by inverse quadratic steps (Chandrupatla)."""
-    a, b = high, low
-    f_a, f_b = f(a), f(b)
+    a = high
+    b = low
+    f_a = f(a)
+    f_b = f(b)
     if f_a == 0 or f_b == 0:
         return a if f_a == 0 else b
     assert gmpy2.sign(f_a) != gmpy2.sign(f_b), "no change of sign in the bracket"
@@ -41,18 +43,25 @@ def root(f: Function, low: mpfr, high: mpfr) -> mpfr:
         x = a + width * (b - a)
         f_x = f(x)
         if gmpy2.sign(f_x) == gmpy2.sign(f_a):
-            c, f_c = a, f_a
+            c = a
+            f_c = f_a
         else:
-            c, f_c = b, f_b
-            b, f_b = a, f_a
-        a, f_a = x, f_x
+            c = b
+            f_c = f_b
+            b = a
+            f_b = f_a
+        a = x
+        f_a = f_x
         best = a if abs(f_a) < abs(f_b) else b
         tolerance = 4 * epsilon() * abs(best) / abs(b - a) if b != a else mpfr(1)
         if tolerance > 0.5 or f_a == 0:
             return best
-        xi, phi = (a - b) / (c - b), (f_a - f_b) / (f_c - f_b)
+        xi = (a - b) / (c - b)
+        phi = (f_a - f_b) / (f_c - f_b)
         if phi**2 < xi and (1 - phi) ** 2 < 1 - xi:
-            width = f_a / (f_b - f_a) * f_c / (f_b - f_c) + (c - a) / (b - a) * f_a / (f_c - f_a) * f_b / (f_c - f_b)
+            width = f_a / (f_b - f_a) * f_c / (f_b - f_c) + (c - a) / (b - a) * f_a / (
+                f_c - f_a
+            ) * f_b / (f_c - f_b)
         else:
             width = mpfr(1) / 2
         width = min(1 - tolerance, max(tolerance, width))
@@ -60,17 +69,21 @@ def root(f: Function, low: mpfr, high: mpfr) -> mpfr:
 
 def _zeros(f: Function, grid: Sequence[mpfr]) -> list[mpfr]:
     values = [f(x) for x in grid]
-    return [root(f, a, b) for (a, x), (b, y) in pairwise(zip(grid, values, strict=True)) if x * y < 0]
+    return [
+        root(f, a, b) for (a, x), (b, y) in pairwise(zip(grid, values, strict=True)) if x * y < 0
+    ]
 
 
-# ----------------------------------------------------------------------------------------- the shaking
+# ----------------------------------------------------------------------------------------- the
+# shaking
 
 
 @dataclass(frozen=True)
 class Section:
     """A part of the shaking on which Üg is smooth, monotone and of one sign.
 
-    `longest` is the length on which the rule of many nodes is exact, and `nodes` are those that Üg itself takes.
+    `longest` is the length on which the rule of many nodes is exact, and `nodes` are those that Üg
+    itself takes.
     """
 
     start: mpfr
@@ -103,7 +116,10 @@ class Section:
         cuts = [start, end]
         if decay:  # the friction falls by e^-8 at most over a part, until it is negligible
             least, greatest = sorted((abs(self.ground(start)), abs(self.ground(end))))
-            count = min(int(gmpy2.floor((greatest - least) * decay / 8.001)), int(decimals() * math.log(10) / 8))
+            count = min(
+                int(gmpy2.floor((greatest - least) * decay / 8.001)),
+                int(decimals() * math.log(10) / 8),
+            )
             levels = [self.side * (least + 8 * j / decay) for j in range(1, count + 1)]
             with workdps(15):  # these places are of no consequence to the last digit
                 cuts[1:1] = sorted(self.phase(x) for x in levels)
@@ -111,7 +127,8 @@ class Section:
         for a, b in pairwise(cuts):
             parts = int(gmpy2.ceil((b - a) / self.longest))
             for i in range(parts):
-                left, width = a + (b - a) * i / parts, (b - a) / parts
+                left = a + (b - a) * i / parts
+                width = (b - a) / parts
                 for node, weight in rule:
                     phi = left + node * width
                     term = weight * width * rate(self.ground(phi))
@@ -137,13 +154,19 @@ class Waveform:
 
     def alike(self, n: int) -> int:
         """Number of cycles from cycle n on that are the same; 1 within a ramp."""
-        return max(1, self.cycles - math.ceil(self.ramp_out) - n) if n >= math.ceil(self.ramp_in) else 1
+        return (
+            max(1, self.cycles - math.ceil(self.ramp_out) - n)
+            if n >= math.ceil(self.ramp_in)
+            else 1
+        )
 
     def sections(self, n: int, amplitude: mpfr) -> Iterator[Section]:
         """Cycle n, its phase from 0 on."""
         first_alike = math.ceil(self.ramp_in)
         number = first_alike if self.alike(first_alike) > n - first_alike >= 0 else n
-        for start, end, first, last, unit, longest, nodes in _unit_sections(self, number, decimals()):
+        for start, end, first, last, unit, longest, nodes in _unit_sections(
+            self, number, decimals()
+        ):
 
             def ground(phi: mpfr, unit: Function = unit) -> mpfr:
                 return amplitude * unit(phi)
@@ -154,32 +177,61 @@ class Waveform:
 @lru_cache
 def _unit_sections(wave: Waveform, n: int, digits: int) -> list[tuple[Any, ...]]:
     """The sections of a cycle for A = 1."""
-    quarter, terms = gmpy2.const_pi() / 2, wave.terms()
+    quarter = gmpy2.const_pi() / 2
+    terms = wave.terms()
     fastest = max(m for _, m, _ in terms)
-    pieces = [(mpfr(0), 4 * quarter, lambda phi: _harmonic(terms, phi), lambda phi: _harmonic_slope(terms, phi))]
+    pieces = [
+        (
+            mpfr(0),
+            4 * quarter,
+            lambda phi: _harmonic(terms, phi),
+            lambda phi: _harmonic_slope(terms, phi),
+        )
+    ]
     if wave.name in ("triangle", "square"):
-        lines = [(0, 1), (2, -1), (2, -1), (-4, 1)] if wave.name == "triangle" else [(1, 0), (1, 0), (-1, 0), (-1, 0)]
-        pieces = [(i * quarter, (i + 1) * quarter, *_line(at, rate / quarter)) for i, (at, rate) in enumerate(lines)]
+        lines = (
+            [(0, 1), (2, -1), (2, -1), (-4, 1)]
+            if wave.name == "triangle"
+            else [(1, 0), (1, 0), (-1, 0), (-1, 0)]
+        )
+        pieces = [
+            (i * quarter, (i + 1) * quarter, *_line(at, rate / quarter))
+            for i, (at, rate) in enumerate(lines)
+        ]
     scale = mpfr(1)
     if wave.name == "harmonics":
         grid = [4 * quarter * i / (24 * fastest) for i in range(24 * fastest + 1)]
-        scale = max(abs(_harmonic(terms, phi)) for phi in _zeros(lambda phi: _harmonic_slope(terms, phi), grid))
-    kinks = [4 * quarter * (mpfr(wave.ramp_in) - n), 4 * quarter * (wave.cycles - mpfr(wave.ramp_out) - n)]
+        scale = max(
+            abs(_harmonic(terms, phi))
+            for phi in _zeros(lambda phi: _harmonic_slope(terms, phi), grid)
+        )
+    kinks = [
+        4 * quarter * (mpfr(wave.ramp_in) - n),
+        4 * quarter * (wave.cycles - mpfr(wave.ramp_out) - n),
+    ]
     found = []
     for start, end, w, slope in pieces:
         for a, b in pairwise([start, *(kink for kink in kinks if start < kink < end), end]):
-            height, incline = mpfr(1) / scale, mpfr(0)
+            height = mpfr(1) / scale
+            incline = mpfr(0)
             if (a + b) / 2 < kinks[0]:
-                height, incline = n / mpfr(wave.ramp_in) / scale, 1 / (4 * quarter * mpfr(wave.ramp_in)) / scale
+                height = n / mpfr(wave.ramp_in) / scale
+                incline = 1 / (4 * quarter * mpfr(wave.ramp_in)) / scale
             elif (a + b) / 2 > kinks[1]:
                 height = (wave.cycles - n) / mpfr(wave.ramp_out) / scale
                 incline = -1 / (4 * quarter * mpfr(wave.ramp_out)) / scale
 
-            def unit(phi: mpfr, w: Function = w, height: mpfr = height, incline: mpfr = incline) -> mpfr:
+            def unit(
+                phi: mpfr, w: Function = w, height: mpfr = height, incline: mpfr = incline
+            ) -> mpfr:
                 return (height + incline * phi) * w(phi)
 
             def rate(
-                phi: mpfr, w: Function = w, dw: Function = slope, height: mpfr = height, incline: mpfr = incline
+                phi: mpfr,
+                w: Function = w,
+                dw: Function = slope,
+                height: mpfr = height,
+                incline: mpfr = incline,
             ) -> mpfr:
                 return incline * w(phi) + (height + incline * phi) * dw(phi)
 
@@ -192,10 +244,19 @@ def _unit_sections(wave: Waveform, n: int, digits: int) -> list[tuple[Any, ...]]
                 if phi - ends[-1] > mpfr(10) ** (-decimals() // 2):
                     ends.append(phi)
             for x, y in pairwise(ends):
-                values = [mpfr(0) if abs(unit(phi)) < epsilon() * 2**20 else unit(phi) for phi in (x, y)]
+                values = [
+                    mpfr(0) if abs(unit(phi)) < epsilon() * 2**20 else unit(phi) for phi in (x, y)
+                ]
                 shape = w if height == 1 and incline == 0 else unit
                 found.append(
-                    (x, y, *values, shape, 4 * quarter if straight else quarter / 2 / fastest, 2 if straight else 12)
+                    (
+                        x,
+                        y,
+                        *values,
+                        shape,
+                        4 * quarter if straight else quarter / 2 / fastest,
+                        2 if straight else 12,
+                    )
                 )
     return found
 

@@ -11,31 +11,58 @@ from slipsweep.motion.shaking import CHANNELS, RESPONSES
 
 #: One test in either sliding mode: parameters and a motion of the table.
 STICK_SLIP: dict[str, Any] = {
-    "theta": 5.0, "mu_s": 0.38, "amplitude": 3.55, "frequency": 1.8,
-    "yield_acceleration": 0.59, "decay_rate": 2.7, "delta_mu": 0.09, "excitation": slipsweep.Sine(cycles=5),
-}  # fmt: skip
+    "theta": 5.0,
+    "mu_s": 0.38,
+    "amplitude": 3.55,
+    "frequency": 1.8,
+    "yield_acceleration": 0.59,
+    "decay_rate": 2.7,
+    "delta_mu": 0.09,
+    "excitation": slipsweep.Sine(cycles=5),
+}
 CONTINUOUS: dict[str, Any] = {
-    "theta": 6.0, "mu_s": 0.38, "amplitude": 5.6, "frequency": 2.5,
-    "yield_acceleration": 0.9, "decay_rate": 2.3, "delta_mu": 0.11, "excitation": slipsweep.Sine(cycles=8),
-}  # fmt: skip
+    "theta": 6.0,
+    "mu_s": 0.38,
+    "amplitude": 5.6,
+    "frequency": 2.5,
+    "yield_acceleration": 0.9,
+    "decay_rate": 2.3,
+    "delta_mu": 0.11,
+    "excitation": slipsweep.Sine(cycles=8),
+}
 
-#: Tests that determine all three parameters well: Üy lies beyond where Eq. 4 meets the table's acceleration, and the
-#: block follows Eq. 4 over a part of each rise that is long enough to tell λ from Δμ.
+#: Tests that determine all three parameters well: Üy lies beyond where Eq. 4 meets the table's
+#: acceleration, and the block follows Eq. 4 over a part of each rise that is long enough to tell λ
+#: from Δμ.
 CALIBRATED: dict[str, dict[str, Any]] = {
     "stick_slip": {
-        "theta": 5.0, "mu_s": 0.38, "amplitude": 5.0, "frequency": 2.0,
-        "yield_acceleration": 1.8, "decay_rate": 2.0, "delta_mu": 0.1, "excitation": slipsweep.Sine(cycles=5),
+        "theta": 5.0,
+        "mu_s": 0.38,
+        "amplitude": 5.0,
+        "frequency": 2.0,
+        "yield_acceleration": 1.8,
+        "decay_rate": 2.0,
+        "delta_mu": 0.1,
+        "excitation": slipsweep.Sine(cycles=5),
     },
     "continuous": {
-        "theta": 6.0, "mu_s": 0.38, "amplitude": 7.0, "frequency": 2.5,
-        "yield_acceleration": 2.0, "decay_rate": 2.3, "delta_mu": 0.05, "excitation": slipsweep.Sine(cycles=5),
+        "theta": 6.0,
+        "mu_s": 0.38,
+        "amplitude": 7.0,
+        "frequency": 2.5,
+        "yield_acceleration": 2.0,
+        "decay_rate": 2.3,
+        "delta_mu": 0.05,
+        "excitation": slipsweep.Sine(cycles=5),
     },
-}  # fmt: skip
+}
 
 SOUGHT = ("yield_acceleration", "decay_rate", "delta_mu")
 
 
-def exact(case: dict[str, Any], rate: float = 200.0, lead: float = 0.5, tail: float = 0.5) -> xr.Dataset:
+def exact(
+    case: dict[str, Any], rate: float = 200.0, lead: float = 0.5, tail: float = 0.5
+) -> xr.Dataset:
     """What the channels of a test would be without sensors: `lead` and `tail` s of rest about the shaking."""
     excitation = case["excitation"]
     shaken = excitation.cycles / case["frequency"]
@@ -79,12 +106,20 @@ def coulomb(kinetic: float, noise: float = 0.01, seed: int = 0) -> xr.Dataset:
 
     Integrated in steps of 1/8000 s, independently of the solvers.
     """
-    rate, fine, shaken, peak = 200, 40, 3.0, 0.55 * 9.81
+    rate = 200
+    fine = 40
+    shaken = 3.0
+    peak = 0.55 * 9.81
     times = np.arange(round((shaken + 1.0) * rate * fine)) / (rate * fine)
     moving = (times > 0.25) & (times < 0.25 + shaken)
     table = np.where(moving, peak * np.sin(4.0 * np.pi * (times - 0.25)), 0.0)
-    onset, held = (9.81 * np.tan(np.arctan(friction) - np.radians(6.0)) for friction in (0.38, kinetic))
-    block, velocity, speed, slides = table.copy(), np.zeros(times.size), 0.0, False
+    onset, held = (
+        9.81 * np.tan(np.arctan(friction) - np.radians(6.0)) for friction in (0.38, kinetic)
+    )
+    block = table.copy()
+    velocity = np.zeros(times.size)
+    speed = 0.0
+    slides = False
     for i, value in enumerate(table):
         slides = slides or value > onset
         if slides:

@@ -1,6 +1,7 @@
 """Cells under a sine solved twice, thousands at once: in SIMD batches, and from event to event as under any wave.
 
-`tests/kernels/test_agreement.py` does so for some sweeps, ``python -m benchmarks.agreement`` for many.
+`tests/kernels/test_agreement.py` does so for some sweeps, ``python -m benchmarks.agreement`` for
+many.
 """
 
 from dataclasses import dataclass
@@ -15,13 +16,15 @@ from tests.support.strategies import G
 
 Array = NDArray[np.float64]
 
-#: The largest relative difference, and the largest in parts of what moves the block, of which D is a difference: a
-#: dozen times what five million cells have shown (benchmarks/results/agreement.md).
-FLOOR, ROUNDING = 1e-9, 1e-14
+#: The largest relative difference, and the largest in parts of what moves the block, of which D is
+#: a difference: a dozen times what five million cells have shown (benchmarks/results/agreement.md).
+FLOOR = 1e-9
+ROUNDING = 1e-14
 
-#: Relative moves of friction and amplitude, of some roundings, and how much more than by these two ways may differ:
-#: a block that stops anew in each of 65 pulses forgets how it began.
-MOVES, TIMES = ((-1e-15, -1e-15), (-1e-15, 1e-15), (1e-15, -1e-15), (1e-15, 1e-15)), 30.0
+#: Relative moves of friction and amplitude, of some roundings, and how much more than by these two
+#: ways may differ: a block that stops anew in each of 65 pulses forgets how it began.
+MOVES = ((-1e-15, -1e-15), (-1e-15, 1e-15), (1e-15, -1e-15), (1e-15, 1e-15))
+TIMES = 30.0
 
 MODELS = (
     *[slipsweep.Mendez()] * 3,
@@ -42,8 +45,14 @@ class Drawn:
 
     def swept(self, cells: dict[str, Array], walked: bool = True) -> xr.Dataset:
         """The cells, or some of them; a sine that is called a harmonic takes the walk of all waves."""
-        columns: dict[str, Any] = {name: xr.DataArray(values, dims="cell") for name, values in cells.items()}
-        excitation = slipsweep.Harmonics([1.0], [1], cycles=self.cycles) if walked else slipsweep.Sine(self.cycles)
+        columns: dict[str, Any] = {
+            name: xr.DataArray(values, dims="cell") for name, values in cells.items()
+        }
+        excitation = (
+            slipsweep.Harmonics([1.0], [1], cycles=self.cycles)
+            if walked
+            else slipsweep.Sine(self.cycles)
+        )
         return slipsweep.sweep(**columns, frequency=1.0, excitation=excitation, model=self.model)
 
     def cell(self, at: int) -> str:
@@ -79,18 +88,27 @@ def drawn(seed: int, count: int) -> Drawn:
         limit * (1.0 + rng.choice([-1.0, 1.0], count) * between(1e-6, 0.9)),
         onset + rng.uniform(0.0, 1.0, count) * (limit - onset),
     )
-    return Drawn(cycles, model, cells | {"amplitude": np.clip(amplitudes[rng.integers(4)], 1e-3, 1e3)})
+    return Drawn(
+        cycles, model, cells | {"amplitude": np.clip(amplitudes[rng.integers(4)], 1e-3, 1e3)}
+    )
 
 
 def times_bound(one: Drawn) -> Array:
     """Of each cell how far the two ways differ over the bound, in displacement or largest velocity: 1 at most."""
-    batches, walk = one.swept(one.cells, walked=False), one.swept(one.cells)
+    batches = one.swept(one.cells, walked=False)
+    walk = one.swept(one.cells)
     drives = one.cells["amplitude"] + G * (one.cells["mu_s"] + one.cells.get("delta_mu", 0.0))
-    scales = {"permanent_displacement": drives / (2 * np.pi) ** 2, "peak_relative_velocity": drives / (2 * np.pi)}
+    scales = {
+        "permanent_displacement": drives / (2 * np.pi) ** 2,
+        "peak_relative_velocity": drives / (2 * np.pi),
+    }
     times = np.where(batches.validity.values == walk.validity.values, 0.0, np.inf)
     for name, scale in scales.items():
-        found, right = batches[name].values, walk[name].values
-        apart = np.where(np.isnan(found) == np.isnan(right), np.nan_to_num(np.abs(found - right)), np.inf)
+        found = batches[name].values
+        right = walk[name].values
+        apart = np.where(
+            np.isnan(found) == np.isnan(right), np.nan_to_num(np.abs(found - right)), np.inf
+        )
         bound = FLOOR * np.nan_to_num(np.abs(right)) + ROUNDING * one.cycles**2 * scale
         (beyond,) = np.nonzero(np.isfinite(apart) & (apart > bound))
         if beyond.size:
@@ -104,6 +122,9 @@ def _spread(one: Drawn, cells: NDArray[np.intp], name: str, right: Array) -> Arr
     picked = {key: values[cells] for key, values in one.cells.items()}
     apart = np.zeros(cells.size)
     for a, b in MOVES:
-        moved = picked | {"mu_s": picked["mu_s"] * (1.0 + a), "amplitude": picked["amplitude"] * (1.0 + b)}
+        moved = picked | {
+            "mu_s": picked["mu_s"] * (1.0 + a),
+            "amplitude": picked["amplitude"] * (1.0 + b),
+        }
         apart = np.fmax(apart, np.abs(one.swept(moved)[name].values - right))
     return apart

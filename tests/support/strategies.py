@@ -12,7 +12,11 @@ from hypothesis import strategies as st
 
 #: Settings of every property test: the same cells on each run, none cut short by compilation.
 reproducible = settings(
-    max_examples=40, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck)
+    max_examples=40,
+    deadline=None,
+    derandomize=True,
+    database=None,
+    suppress_health_check=list(HealthCheck),
 )
 
 G = 9.81
@@ -26,13 +30,20 @@ cycles = st.integers(1, 12)
 thetas = st.just(0.0) | st.floats(0.1, 35.0)
 frictions = st.floats(0.1, 1.2)
 model_options = st.fixed_dictionaries(
-    {"rise": st.sampled_from(["monotone", "literal"]), "recoupling": st.sampled_from(["eq12", "integrate"])}
+    {
+        "rise": st.sampled_from(["monotone", "literal"]),
+        "recoupling": st.sampled_from(["eq12", "integrate"]),
+    }
 )
 
 
 def coulomb_yield(theta: float, mu_s: float) -> float:
     """g tan(phi_s - theta)."""
-    return G * (mu_s * cos(radians(theta)) - sin(radians(theta))) / (cos(radians(theta)) + mu_s * sin(radians(theta)))
+    return (
+        G
+        * (mu_s * cos(radians(theta)) - sin(radians(theta)))
+        / (cos(radians(theta)) + mu_s * sin(radians(theta)))
+    )
 
 
 def limiting_acceleration(theta: float, mu_s: float, yield_acceleration: float) -> float:
@@ -44,7 +55,8 @@ def limiting_acceleration(theta: float, mu_s: float, yield_acceleration: float) 
 @st.composite
 def _planes(draw: st.DrawFn) -> tuple[float, float, float]:
     """theta and mu_s at which the block stands, and the amplitude of uplift."""
-    theta, mu_s = draw(thetas), draw(frictions)
+    theta = draw(thetas)
+    mu_s = draw(frictions)
     tan_theta = tan(radians(theta))
     assume(mu_s > tan_theta + 0.02)
     return theta, mu_s, G / tan_theta if tan_theta > 0 else 10 * G
@@ -74,7 +86,8 @@ def stuck(draw: st.DrawFn) -> Cell:
 def stick_slip(draw: st.DrawFn, measured_yield: bool | None = None) -> Cell:
     """Stick-slip with calibrated friction; the yield acceleration Coulomb's or measured."""
     theta, mu_s, uplift = draw(_planes())
-    onset, options = coulomb_yield(theta, mu_s), {}
+    onset = coulomb_yield(theta, mu_s)
+    options = {}
     if draw(st.booleans()) if measured_yield is None else measured_yield:
         onset *= draw(st.floats(0.05, 0.95))
         options = {"yield_acceleration": onset}
@@ -110,9 +123,15 @@ def given_friction(draw: st.DrawFn) -> Cell:
     """Yield acceleration, decay rate and delta_mu from tests; stick-slip or continuous."""
     theta, mu_s, uplift = draw(_planes())
     onset = coulomb_yield(theta, mu_s) * draw(st.floats(0.05, 1.0))
-    cell = draw(_cells(onset, min(uplift, 3 * limiting_acceleration(theta, mu_s, onset)), theta, mu_s))
+    cell = draw(
+        _cells(onset, min(uplift, 3 * limiting_acceleration(theta, mu_s, onset)), theta, mu_s)
+    )
     rate = draw(st.just(0.0) | st.floats(0.1, 10.0) | st.floats(10.0, 1000.0))
-    friction = {"yield_acceleration": onset, "decay_rate": rate, "delta_mu": draw(st.just(0.0) | st.floats(0.01, 0.4))}
+    friction = {
+        "yield_acceleration": onset,
+        "decay_rate": rate,
+        "delta_mu": draw(st.just(0.0) | st.floats(0.01, 0.4)),
+    }
     return {**cell, **friction, "cycles": draw(cycles)}
 
 

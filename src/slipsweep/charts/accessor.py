@@ -58,31 +58,36 @@ class SlipsweepAccessor:
         Parameters
         ----------
         kind : str, optional
-            Of a sweep "contours", "modes", "families", "curve", "dimensionless", "newmark" or "spread"; of a sweep
-            under a suite "motions", "fragility", "intensity" or "histogram", under one record "motions"; of statistics
-            (`sample`, `suite_statistics`) "fragility", "quantiles" or "sensitivity".  Results of `simulate`
-            ("history"), `limit_amplitude` ("limit"), `displacement_hazard` ("hazard"), `calibrate` ("calibration") and
-            `measured_friction` ("friction") have one chart each.  By default the first one that a dataset has; of a
-            sweep with one axis left "curve".
+            Of a sweep "contours", "modes", "families", "curve", "dimensionless", "newmark" or
+            "spread"; of a sweep under a suite "motions", "fragility", "intensity" or "histogram",
+            under one record "motions"; of statistics (`sample`, `suite_statistics`) "fragility",
+            "quantiles" or "sensitivity".  Results of `simulate` ("history"), `limit_amplitude`
+            ("limit"), `displacement_hazard` ("hazard"), `calibrate` ("calibration") and
+            `measured_friction` ("friction") have one chart each.  By default the first one that a
+            dataset has; of a sweep with one axis left "curve".
         at : mapping of axis to value, optional
-            Value of an axis: a number in its own unit, a text with another ("0.3g"), the label of a case or motion;
-            by default its middle.  "ky" is `yield_coefficient`, and "mu_s" beside an axis `phi` the angle to it.
-            Several values choose the curves or panels of an axis, or the motions of a suite.
+            Value of an axis: a number in its own unit, a text with another ("0.3g"), the label of a
+            case or motion; by default its middle.  "ky" is `yield_coefficient`, and "mu_s" beside
+            an axis `phi` the angle to it. Several values choose the curves or panels of an axis, or
+            the motions of a suite.
         x, y : str, optional
-            Axis to draw over, or an intensity measure; vertical axis of a map, or the curve parameter.
+            Axis to draw over, or an intensity measure; vertical axis of a map, or the curve
+            parameter.
         panels : sequence of str
             One or two axes to draw panels over, across and down.
         variable : str
             What contours and families show.
         levels : sequence of float or str
-            Contours, in the variable's own unit or as texts with another ("5cm"); of a suite's fragility the
-            displacements to exceed.
+            Contours, in the variable's own unit or as texts with another ("5cm"); of a suite's
+            fragility the displacements to exceed.
         units : {"m/s2", "g"}
             Unit of accelerations on the main axis and in the caption.
         show_cautions : bool
-            Draw values flagged `not_recoupled`, too; by default they are left out, because they are unreliable.
+            Draw values flagged `not_recoupled`, too; by default they are left out, because they are
+            unreliable.
         width : float or str, optional
-            Width of the figure: mm, or a text with another unit ("3.5 inch").  Below 127 mm text is smaller.
+            Width of the figure: mm, or a text with another unit ("3.5 inch").  Below 127 mm text is
+            smaller.
         grey : bool
             Draw without colour.
         ax : matplotlib.axes.Axes, optional
@@ -109,7 +114,18 @@ class SlipsweepAccessor:
         from slipsweep.charts.kinds import figure_of
 
         figure = figure_of(
-            self._dataset, kind, at=at, x=x, y=y, panels=panels, variable=variable, levels=levels, units=units,
-            show_cautions=show_cautions, width=width, grey=grey, ax=ax,
-        )  # fmt: skip
+            self._dataset,
+            kind,
+            at=at,
+            x=x,
+            y=y,
+            panels=panels,
+            variable=variable,
+            levels=levels,
+            units=units,
+            show_cautions=show_cautions,
+            width=width,
+            grey=grey,
+            ax=ax,
+        )
         return figure if ax is None else ax

@@ -23,19 +23,32 @@ Curve = tuple[style.Floats, style.Floats]
 
 _NEWMARK: Look = {"color": "0.5", "linewidth": 0.8, "zorder": 1.8}
 _JUMP: Look = {"linestyle": ":", "linewidth": 1.0, "zorder": 1.9}
-_CAUTION: Look = {"color": "0.8", "linewidth": 7, "markersize": 14, "solid_capstyle": "butt", "zorder": 1.5}
+_CAUTION: Look = {
+    "color": "0.8",
+    "linewidth": 7,
+    "markersize": 14,
+    "solid_capstyle": "butt",
+    "zorder": 1.5,
+}
 _UNSOUND: Look = _CAUTION | {"color": "0.55", "linestyle": (0, (0.15, 0.35)), "zorder": 1.6}
 
-#: What an engineer has to choose from in `spread`, what is given for it, and how it is drawn: the end of sliding, and
-#: the friction decay, also as the paper measured it on its shaking table, 2.30 and 2.70 (Table 2).
+#: What an engineer has to choose from in `spread`, what is given for it, and how it is drawn: the
+#: end of sliding, and the friction decay, also as the paper measured it on its shaking table, 2.30
+#: and 2.70 (Table 2).
 _ENDS: dict[Any, tuple[str, Look]] = {
     "eq12": ("Eq. 12", {"color": style.BLUE, "markerfacecolor": style.BLUE}),
     "integrate": ("integration", {"color": style.VERMILION, "markerfacecolor": "white"}),
 }
 _DECAYS: dict[str, tuple[dict[str, Any], Look]] = {
     "λ by Eq. 6": ({"decay_rate": None}, {"linestyle": (0, (7, 2)), "marker": "o"}),
-    "λ = 2": ({"decay_rate": 2.0, "minimum_friction": None}, {"linestyle": (0, (3, 1.5)), "marker": "s"}),
-    "λ = 3": ({"decay_rate": 3.0, "minimum_friction": None}, {"linestyle": (0, (7, 2, 1.5, 2)), "marker": "^"}),
+    "λ = 2": (
+        {"decay_rate": 2.0, "minimum_friction": None},
+        {"linestyle": (0, (3, 1.5)), "marker": "s"},
+    ),
+    "λ = 3": (
+        {"decay_rate": 3.0, "minimum_friction": None},
+        {"linestyle": (0, (7, 2, 1.5, 2)), "marker": "^"},
+    ),
 }
 
 
@@ -63,10 +76,14 @@ def motions(result: Result, options: style.Options) -> Figure:
 def dimensionless(result: Result, options: style.Options) -> Figure:
     """uω²/A against A/Üy, which does not depend on the frequency."""
     if options.x not in (None, *solved.DRIVES):
-        raise InputError(f"{result.name}: --x {options.x}: the dimensionless chart is drawn over A / Üy")
+        raise InputError(
+            f"{result.name}: --x {options.x}: the dimensionless chart is drawn over A / Üy"
+        )
     drive = next((dim for dim in reversed(solved.DRIVES) if dim in result.wide), None)
     if drive is None:
-        raise InputError(f"{result.name}: the dimensionless chart needs an amplitude of two values or more")
+        raise InputError(
+            f"{result.name}: the dimensionless chart needs an amplitude of two values or more"
+        )
     first = ("mu_s", "theta", "yield_acceleration", "yield_coefficient")
     names = result.compared(solved.DISPLACEMENT)
     sheet = result.sheet(replace(options, x=None), names, drive, curves=first, same=["frequency"])
@@ -80,7 +97,8 @@ def _drawn(sheet: Sheet, name: str, scaled: bool = False) -> Figure:
     label = f"{RESULTS[name]['long_name']} ({units})".removesuffix(" ()")
     sheet.show(name, "Barred curves")
     if scaled:
-        label, least = "permanent displacement, u\u00a0ω²\u00a0/\u00a0A", 1e-4
+        label = "permanent displacement, u\u00a0ω²\u00a0/\u00a0A"
+        least = 1e-4
         factor = (2 * np.pi * sheet.data["frequency"]) ** 2 / sheet.data["amplitude"]
         sheet.data["over_yield"] = sheet.data["amplitude"] / sheet.data["yield_line"]
     for one in {"drawn", "newmark"} & {*sheet.data}:
@@ -90,14 +108,20 @@ def _drawn(sheet: Sheet, name: str, scaled: bool = False) -> Figure:
     for panel in sheet.panels:
         log_axis(panel.axes, values, label, least)
         curves = _curves(panel, panel.data["drawn"])
-        looks = curve_looks(len(curves)) if panel.y else [{"color": style.BLUE, "linestyle": "-", "marker": ""}]
+        looks = (
+            curve_looks(len(curves))
+            if panel.y
+            else [{"color": style.BLUE, "linestyle": "-", "marker": ""}]
+        )
         for member, (curve, look) in enumerate(zip(curves, looks, strict=True)):
             _draw(sheet, panel, curve, member, len(curves), look)
         _underlay(sheet, panel)
         if "newmark" in sheet.data:
             _draw_newmark(sheet, panel, looks)
         if scaled:
-            panel.axes.set(xscale="log", xlim=(1.0, None), xlabel="peak ground acceleration over yield, A / Üy")
+            panel.axes.set(
+                xscale="log", xlim=(1.0, None), xlabel="peak ground acceleration over yield, A / Üy"
+            )
             log_ticks(panel.axes.xaxis, 10)
         else:
             _mark_accelerations(sheet, panel)
@@ -108,33 +132,49 @@ def _drawn(sheet: Sheet, name: str, scaled: bool = False) -> Figure:
 def spread(result: Result, options: style.Options) -> Figure:
     """This result, and the range of those of other options: Newmark's block, λ as measured, stop by integration."""
     if "yield_coefficient" in result.data.coords:
-        raise InputError(f"{result.name}: the result has ky alone: other options of the model need theta and mu_s")
+        raise InputError(
+            f"{result.name}: the result has ky alone: other options of the model need theta and mu_s"
+        )
     sheet = result.sheet(options, result.compared(solved.DISPLACEMENT), solved.DRIVES)
     # the others have a mode limit, whatever this one is
     sheet.show(solved.DISPLACEMENT, "Barred, of this result", always=True)
     sheet.data["drawn"] = sheet.data["drawn"] * 1000.0
-    own, looks, flags = MODELS.from_attributes(sheet.data.attrs), {}, []
+    own = MODELS.from_attributes(sheet.data.attrs)
+    looks = {}
+    flags = []
     for text, model, changed, look in _alternatives(own):
-        answer = solved.solve(sheet.data, [solved.DISPLACEMENT, "validity"], model, **changed).reset_coords(drop=True)
-        sheet.data[text] = solved.reliable(answer, solved.DISPLACEMENT, options.show_cautions) * 1000.0
+        answer = solved.solve(
+            sheet.data, [solved.DISPLACEMENT, "validity"], model, **changed
+        ).reset_coords(drop=True)
+        sheet.data[text] = (
+            solved.reliable(answer, solved.DISPLACEMENT, options.show_cautions) * 1000.0
+        )
         looks[text] = {"linewidth": 1.0, "markersize": 3.5, **look}
         flags.append(answer["validity"])
     text = f"this result:\n{_own_text(own, sheet.data)}"
-    sheet.data[text], looks[text] = sheet.data["drawn"], {"color": "black", "linewidth": 2.4, "zorder": 2.5}
+    sheet.data[text] = sheet.data["drawn"]
+    looks[text] = {"color": "black", "linewidth": 2.4, "zorder": 2.5}
     for panel in sheet.panels:
         log_axis(panel.axes, sheet.data[[*looks]].to_array().values, "permanent displacement (mm)")
         curves = [_curves(panel, panel.data[text])[0] for text in looks]
-        xs, each = curves[0][0], np.array([ys for _, ys in curves])
+        xs = curves[0][0]
+        each = np.array([ys for _, ys in curves])
         # what is zero lies below any logarithmic axis, not nowhere
-        low, high = (np.maximum(most(each, axis=0), 1e-300) for most in (np.fmin.reduce, np.fmax.reduce))
+        low, high = (
+            np.maximum(most(each, axis=0), 1e-300) for most in (np.fmin.reduce, np.fmax.reduce)
+        )
         area: Look = {"facecolor": "0.92", "linewidth": 0, "zorder": 1, "gid": "spread"}
         sheet.legend["range of these results"] = panel.axes.fill_between(xs, low, high, **area)
         for number, (ys, (text, look)) in enumerate(zip(each, looks.items(), strict=True)):
-            sheet.legend[text] = plot_curve(panel.axes, xs, ys, number / len(each), label=text, **look)
+            sheet.legend[text] = plot_curve(
+                panel.axes, xs, ys, number / len(each), label=text, **look
+            )
         _underlay(sheet, panel)
         _mark_accelerations(sheet, panel)
     sheet.note_left_out(solved.DISPLACEMENT, *flags)
-    sheet.notes.append("All results have the same Üy; λ = 2 to 3 is what the paper measured on its interface.")
+    sheet.notes.append(
+        "All results have the same Üy; λ = 2 to 3 is what the paper measured on its interface."
+    )
     return sheet.done()
 
 
@@ -142,8 +182,15 @@ def _alternatives(own: Model) -> Iterator[tuple[str, Model, dict[str, Any], Look
     """What may be computed in place of a result: its name in the legend, model, changed parameters, and look."""
     yield style.NEWMARK, Newmark(g=own.g), {}, {"color": "0.35", "linestyle": "-", "marker": "x"}
     ours = own if isinstance(own, Mendez) else Mendez(g=own.g)
-    for (recoupling, (end, colours)), (decay, (changed, dash)) in itertools.product(_ENDS.items(), _DECAYS.items()):
-        yield f"{decay}, stop by {end}", replace(ours, recoupling=recoupling), changed, colours | dash
+    for (recoupling, (end, colours)), (decay, (changed, dash)) in itertools.product(
+        _ENDS.items(), _DECAYS.items()
+    ):
+        yield (
+            f"{decay}, stop by {end}",
+            replace(ours, recoupling=recoupling),
+            changed,
+            colours | dash,
+        )
 
 
 def _own_text(own: Model, data: xr.Dataset) -> str:
@@ -151,7 +198,13 @@ def _own_text(own: Model, data: xr.Dataset) -> str:
     if not isinstance(own, Mendez):
         return style.NEWMARK
     given = data.coords.get("decay_rate")
-    decay = "λ by Eq. 6" if given is None else f"λ = {given.item():.3g}" if given.size == 1 else "λ as given"
+    decay = (
+        "λ by Eq. 6"
+        if given is None
+        else f"λ = {given.item():.3g}"
+        if given.size == 1
+        else "λ as given"
+    )
     return f"{decay}, stop by {_ENDS[own.recoupling][0]}"
 
 
@@ -164,13 +217,18 @@ def _curves(panel: Panel, array: xr.DataArray, gaps: bool = True) -> list[Curve]
         return curves
     beyond = panel.grid("amplitude") > panel.grid("limit_line")
     jumps = [np.flatnonzero(one[1:] != one[:-1]) + 1 for one in beyond]
-    return [(np.insert(xs, at, xs[at]), np.insert(ys, at, np.nan)) for (xs, ys), at in zip(curves, jumps, strict=True)]
+    return [
+        (np.insert(xs, at, xs[at]), np.insert(ys, at, np.nan))
+        for (xs, ys), at in zip(curves, jumps, strict=True)
+    ]
 
 
 def _draw(sheet: Sheet, panel: Panel, curve: Curve, member: int, members: int, look: Look) -> None:
     """Draw a curve of a family, its jumps as dotted lines."""
     xs, ys = curve
-    text = panel.member(member) or (style.NEWMARK if solved.is_newmark(panel.data) else "this result")
+    text = panel.member(member) or (
+        style.NEWMARK if solved.is_newmark(panel.data) else "this result"
+    )
     sheet.legend[text] = plot_curve(panel.axes, xs, ys, member / members, label=text, **look)
     for at in np.flatnonzero(np.isnan(ys[1:-1]) & (xs[1:-1] == xs[2:])) + 1:
         ends = [at - 1, at + 1]
@@ -182,7 +240,9 @@ def _draw(sheet: Sheet, panel: Panel, curve: Curve, member: int, members: int, l
 def _draw_newmark(sheet: Sheet, panel: Panel, looks: list[Look]) -> None:
     """Draw Newmark's curves: thin, with the dashes of a family; dashed where there is one curve."""
     single: Look = {"linestyle": (0, (5, 2)), "linewidth": 1.4, "color": "0.3"}
-    for (xs, ys), look in zip(_curves(panel, panel.data["newmark"], gaps=False), looks, strict=True):
+    for (xs, ys), look in zip(
+        _curves(panel, panel.data["newmark"], gaps=False), looks, strict=True
+    ):
         own = _NEWMARK | ({"linestyle": look["linestyle"]} if panel.y else single)
         panel.axes.plot(xs, np.where(ys > 0, ys, np.nan), gid="newmark", **own)
     text = f"{style.NEWMARK} (same dash)" if panel.y else style.NEWMARK
@@ -208,9 +268,16 @@ def _underlay(sheet: Sheet, panel: Panel) -> None:
 
 def _mark_accelerations(sheet: Sheet, panel: Panel) -> None:
     """Vertical lines where the amplitude passes a threshold that all curves of a panel share."""
-    (low, high), data = panel.axes.get_xlim(), panel.data
-    if panel.x in ("yield_coefficient", "yield_acceleration") and "amplitude" in data and not solved.is_recorded(data):
-        scale = 1 / panel.g if panel.x == "yield_coefficient" else panel.options.scale(panel.x, panel.g)
+    (low, high) = panel.axes.get_xlim()
+    data = panel.data
+    if (
+        panel.x in ("yield_coefficient", "yield_acceleration")
+        and "amplitude" in data
+        and not solved.is_recorded(data)
+    ):
+        scale = (
+            1 / panel.g if panel.x == "yield_coefficient" else panel.options.scale(panel.x, panel.g)
+        )
         place = data["amplitude"].values.max() * scale
         if low < place < high and data["amplitude"].size == 1:
             look: Look = {"facecolor": "none", "edgecolor": "0.7", "hatch": ".."}
@@ -220,4 +287,6 @@ def _mark_accelerations(sheet: Sheet, panel: Panel) -> None:
         if name in data and data[name].size == 1:
             place = data[name].item() * panel.options.scale("amplitude", panel.g)
             if low <= place <= high:
-                sheet.remarks[text] = panel.axes.axvline(place, gid=name, **{**look, "linewidth": 1.0, "zorder": 1.7})
+                sheet.remarks[text] = panel.axes.axvline(
+                    place, gid=name, **{**look, "linewidth": 1.0, "zorder": 1.7}
+                )

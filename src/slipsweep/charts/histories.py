@@ -21,7 +21,12 @@ from slipsweep.model.variables import SlidingMode
 _MODES: dict[SlidingMode, Look] = {
     SlidingMode.STUCK: {"facecolor": "white", "edgecolor": "0.6", "linewidth": 0.5},
     SlidingMode.STICK_SLIP: {"facecolor": "#BBD7EA", "edgecolor": BLUE, "linewidth": 0.5},
-    SlidingMode.CONTINUOUS: {"facecolor": VERMILION, "edgecolor": "black", "linewidth": 0.5, "hatch": "/////"},
+    SlidingMode.CONTINUOUS: {
+        "facecolor": VERMILION,
+        "edgecolor": "black",
+        "linewidth": 0.5,
+        "hatch": "/////",
+    },
 }
 
 #: What legends above a panel have in common.
@@ -61,9 +66,12 @@ def _finish(drawing: Drawing, labels: Sequence[str], texts: list[str]) -> Figure
 def history(result: Result, options: Options) -> Figure:
     """A time history in the manner of the paper's Figs. 5, 8 and 9; of a record with the modes of its half waves."""
     data = result.data
-    modes, friction = "half_wave_mode" in data, "friction_coefficient" in data
+    modes = "half_wave_mode" in data
+    friction = "friction_coefficient" in data
     heights = [0.22] * modes + [1.0] * (3 + friction)
-    drawing = Drawing(options, len(heights), 1, (7.0, 7.0 + 0.5 * modes), sharey=False, height_ratios=heights)
+    drawing = Drawing(
+        options, len(heights), 1, (7.0, 7.0 + 0.5 * modes), sharey=False, height_ratios=heights
+    )
     accelerations, *coefficient, velocity, displacement = drawing.grid.ravel()[modes:]
     _plot(accelerations, data, "ground_acceleration", color=BLUE, label="base")
     _plot(accelerations, data, "block_acceleration", linestyle="--", label="block")
@@ -73,14 +81,22 @@ def history(result: Result, options: Options) -> Figure:
         for name, value in thresholds(data).items():
             if np.isfinite(value) and value <= 1.5 * highest:
                 text, look = style.LINES[str(name)]
-                accelerations.axhline(value.item(), label=text, gid=name, **{**look, "linewidth": 0.9, "zorder": 1.5})
+                accelerations.axhline(
+                    value.item(), label=text, gid=name, **{**look, "linewidth": 0.9, "zorder": 1.5}
+                )
     accelerations.legend(fontsize="small", **_ABOVE)
     for panel in coefficient:
         _plot(panel, data, "friction_coefficient")
     _plot(velocity, data, "relative_velocity")
-    factor, unit = (1.0, "m") if (np.abs(data["relative_displacement"]) >= 1.0).any() else (1000.0, "mm")
+    factor, unit = (
+        (1.0, "m") if (np.abs(data["relative_displacement"]) >= 1.0).any() else (1000.0, "mm")
+    )
     _plot(displacement, data, "relative_displacement", factor)
-    labels = [*_LABELS[: 1 + friction], "relative\nvelocity (m/s)", f"relative\ndisplacement ({unit})"]
+    labels = [
+        *_LABELS[: 1 + friction],
+        "relative\nvelocity (m/s)",
+        f"relative\ndisplacement ({unit})",
+    ]
     return _finish(drawing, labels, [style.caption(data, options)])
 
 
@@ -110,27 +126,45 @@ def friction(result: Result, options: Options) -> Figure:
     _plot(accelerations, table, "block_acceleration", linewidth=1.0, label="block")
     accelerations.legend(**_ABOVE)
     _friction_lines(table, coefficient)
-    coefficient.axhline(table["mu_s"].item(), color=_GREY, linewidth=0.8, linestyle="--", label="μs")
+    coefficient.axhline(
+        table["mu_s"].item(), color=_GREY, linewidth=0.8, linestyle="--", label="μs"
+    )
     coefficient.legend(**_ABOVE)
     stops = table["slide_stop"].fillna(table["time"].values[-1]).values
-    for panel, span in itertools.product(drawing.grid.ravel(), zip(table["slide_onset"].values, stops, strict=True)):
+    for panel, span in itertools.product(
+        drawing.grid.ravel(), zip(table["slide_onset"].values, stops, strict=True)
+    ):
         panel.axvspan(*span, color="0.92", zorder=0)
     shaded = f"shaded: slides, relative acceleration beyond {table.attrs['threshold']:.3g} m/s²"
-    return _finish(drawing, _LABELS, [table.attrs["constant_friction"], f"{_given(table)}; {shaded}"])
+    return _finish(
+        drawing, _LABELS, [table.attrs["constant_friction"], f"{_given(table)}; {shaded}"]
+    )
 
 
 def calibration(result: Result, options: Options) -> Figure:
     """Measured against computed motion in the manner of the paper's Figs. 8 and 9, a column for each test."""
     table = result.data
-    tests = [table.isel(test=i) for i in range(table.sizes["test"])] if "test" in table.dims else [table]
+    tests = (
+        [table.isel(test=i) for i in range(table.sizes["test"])]
+        if "test" in table.dims
+        else [table]
+    )
     labels = ["acceleration of\nthe table (m/s²)", *(label for label, *_ in _CHANNELS.values())]
     labels += _LABELS[1:] if "free_body_friction" in table else ()
     width = 7.0 if len(tests) == 1 else 5.0 * len(tests)
     drawing = Drawing(options, len(labels), len(tests), (width, 9.0), sharey=False)
     for test, panels in zip(tests, drawing.grid.T, strict=True):
-        _draw_test(test.isel({test["time"].dims[0]: test["computed_ground_acceleration"].notnull().values}), panels)
-    attrs, texts = table.attrs, [table.attrs["constant_friction"]]
-    if attrs["model_table"].startswith("# WARNING"):  # what `calibrate` comments out must not be read off a figure
+        _draw_test(
+            test.isel(
+                {test["time"].dims[0]: test["computed_ground_acceleration"].notnull().values}
+            ),
+            panels,
+        )
+    attrs = table.attrs
+    texts = [table.attrs["constant_friction"]]
+    if attrs["model_table"].startswith(
+        "# WARNING"
+    ):  # what `calibrate` comments out must not be read off a figure
         texts.append(f"Not ready for use. {attrs['findings'].splitlines()[0]}")
     texts.append(_parameters(table))
     if attrs["removed"] != "nothing":
@@ -139,14 +173,21 @@ def calibration(result: Result, options: Options) -> Figure:
 
 
 def _draw_test(table: xr.Dataset, panels: Sequence[Axes]) -> None:
-    measured: Look = {"color": _GREY, "marker": ".", "linestyle": "", "markersize": 2, "label": "measured"}
+    measured: Look = {
+        "color": _GREY,
+        "marker": ".",
+        "linestyle": "",
+        "markersize": 2,
+        "label": "measured",
+    }
     _plot(panels[0], table, "measured_ground_acceleration", **measured)
     _plot(panels[0], table, "computed_ground_acceleration", color=BLUE, label="smooth")
     for panel, (name, (_, factor, unit)) in zip(panels[1:4], _CHANNELS.items(), strict=True):
         text = "not measured"
         if f"misfit_{name}" in table and bool(table[f"misfit_{name}"].notnull()):
             _plot(panel, table, f"measured_{name}", factor, **measured)
-            misfit, share = factor * table[f"misfit_{name}"].item(), table[f"relative_misfit_{name}"].item()
+            misfit = factor * table[f"misfit_{name}"].item()
+            share = table[f"relative_misfit_{name}"].item()
             text = f"misfit {misfit:.2g} {unit} ({share:.1%})"
         _plot(panel, table, f"computed_{name}", factor, linewidth=1.2, label="computed")
         panel.set_title(text, fontsize="small", loc="left")
@@ -175,5 +216,7 @@ def _parameters(table: xr.Dataset) -> str:
         ends = f"{low:.3g} to {high:.3g}" if np.isfinite(high) else f"{low:.3g} or more"
         known = bool(table[f"{name}_error"].notnull())
         value = f"= {style.with_unit(f'{table[name].item():.4g}', unit)} ({ends})"
-        parts.append(f"{style.SYMBOLS[name]} {value if known else f'not determined ({style.with_unit(ends, unit)})'}")
+        parts.append(
+            f"{style.SYMBOLS[name]} {value if known else f'not determined ({style.with_unit(ends, unit)})'}"
+        )
     return f"{', '.join(parts)}; 95 % intervals\n{_given(table)}"

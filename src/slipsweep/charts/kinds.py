@@ -21,15 +21,28 @@ from slipsweep.model.variables import PARAMETERS, REFERENCE
 
 Draw = Callable[[Result, Options], Figure]
 
-#: Of each sort of result: what it is called in messages, and its charts, of the kinds that their functions' names say.
+#: Of each sort of result: what it is called in messages, and its charts, of the kinds that their
+#: functions' names say.
 SORTS: dict[str, tuple[str, tuple[Draw, ...]]] = {
     "sweep": (
         "a sweep under harmonic motion",
-        (maps.contours, maps.modes, curves.families, curves.curve, curves.dimensionless, maps.newmark, curves.spread),
+        (
+            maps.contours,
+            maps.modes,
+            curves.families,
+            curves.curve,
+            curves.dimensionless,
+            maps.newmark,
+            curves.spread,
+        ),
     ),
-    "statistics": ("statistics of displacements", (statistics.fragility, statistics.quantiles, statistics.sensitivity)),
+    "statistics": (
+        "statistics of displacements",
+        (statistics.fragility, statistics.quantiles, statistics.sensitivity),
+    ),
     "suite": (
-        "a sweep under a suite of motions", (suites.motions, suites.fragility, suites.intensity, suites.histogram)
+        "a sweep under a suite of motions",
+        (suites.motions, suites.fragility, suites.intensity, suites.histogram),
     ),
     "record": ("a sweep under a recorded motion", (curves.motions,)),
     "history": ("a time history", (histories.history,)),
@@ -37,7 +50,7 @@ SORTS: dict[str, tuple[str, tuple[Draw, ...]]] = {
     "friction": ("measured friction", (histories.friction,)),
     "calibration": ("a calibration", (histories.calibration,)),
     "hazard": ("annual rates", (limits.hazard,)),
-}  # fmt: skip
+}
 
 
 def kinds_of(sort: str) -> dict[str, Draw]:
@@ -57,7 +70,9 @@ def fitting(result: Result, options: Options) -> list[str]:
     """The kinds that are drawn of a result if none is named; with one axis left, its curve."""
     kinds = kinds_of(result.sort)
     if result.sort != "sweep":
-        return [kind for kind in kinds if kind != "sensitivity" or "total_index" in result.variables]
+        return [
+            kind for kind in kinds if kind != "sensitivity" or "total_index" in result.variables
+        ]
     if solved.DISPLACEMENT not in result.variables:
         return ["modes"]
     free = [dim for dim in result.groups if dim not in (*options.at, *options.panels)]
@@ -65,7 +80,9 @@ def fitting(result: Result, options: Options) -> list[str]:
         several = any(len(places) > 1 for places in result.places(options.at).values())
         return ["families"] if several or options.panels else ["curve"]
     unfit = {"curve"}
-    if solved.is_newmark(result.data):  # the ratio is 1, and without θ and μs there are no other options
+    if solved.is_newmark(
+        result.data
+    ):  # the ratio is 1, and without θ and μs there are no other options
         unfit |= {"newmark", *(["spread"] if "yield_coefficient" in result.data.coords else [])}
     return [kind for kind in kinds if kind not in unfit]
 
@@ -76,7 +93,9 @@ def draw(result: Result, kind: str | None, options: Options) -> Figure:
     kind = fitting(result, options)[0] if kind is None else check_kind(kind)
     if kind not in kinds:
         allowed = f"{'one of ' if len(kinds) > 1 else ''}{', '.join(kinds)}"
-        raise InputError(f"{result.name}: --kind {kind}: is {SORTS[result.sort][0]}: must be {allowed}")
+        raise InputError(
+            f"{result.name}: --kind {kind}: is {SORTS[result.sort][0]}: must be {allowed}"
+        )
     for name in ("at", "x", "y", "panels", "levels"):
         if getattr(options, name) and not result.dims:
             raise InputError(f"{result.name}: --{name}: not with {kind}, which is drawn as a whole")
@@ -86,10 +105,14 @@ def draw(result: Result, kind: str | None, options: Options) -> Figure:
         except KeyError as error:
             if result.dims:
                 raise
-            raise InputError(f"{result.name}: {error.args[0]}: not there, but {kind} needs it") from None
+            raise InputError(
+                f"{result.name}: {error.args[0]}: not there, but {kind} needs it"
+            ) from None
 
 
-def figure_of(data: xr.Dataset, kind: str | None = None, at: Mapping[str, At] | None = None, **chosen: Any) -> Figure:
+def figure_of(
+    data: xr.Dataset, kind: str | None = None, at: Mapping[str, At] | None = None, **chosen: Any
+) -> Figure:
     """Draw a chart of a dataset: the options are those of `SlipsweepAccessor.chart`."""
     return draw(Result(data, "dataset"), kind, Options(at=own_names(data, at or {}), **chosen))
 
@@ -108,7 +131,9 @@ def draw_all(
                 raise
             left_out[kind] = str(error).removeprefix(f"{result.name}: ")
     if not figures:
-        raise InputError(f"{result.name}: no chart can be drawn from it: {'; '.join(dict.fromkeys(left_out.values()))}")
+        raise InputError(
+            f"{result.name}: no chart can be drawn from it: {'; '.join(dict.fromkeys(left_out.values()))}"
+        )
     return figures, left_out
 
 
@@ -123,18 +148,29 @@ def write_book(path: Path, result: Result, figures: Iterable[Figure]) -> None:
     """Write a title page and some charts as pages of one PDF."""
     from matplotlib.backends.backend_pdf import PdfPages  # here: other charts do without it
 
-    with PdfPages(path, metadata={"Title": str(result.attrs.get("title", "")), "Creator": "slipsweep"}) as pages:
+    with PdfPages(
+        path, metadata={"Title": str(result.attrs.get("title", "")), "Creator": "slipsweep"}
+    ) as pages:
         for figure in (title_page(result), *figures):
             pages.savefig(figure)
 
 
 def title_page(result: Result) -> Figure:
     """What was computed, of which inputs, by which model and estimates, and by which versions."""
-    attributes, coords = result.attrs, result.data.coords
-    names = {name: f"{about['long_name']} {style.SYMBOLS[name]}" for name, about in PARAMETERS.items()}
+    attributes = result.attrs
+    coords = result.data.coords
+    names = {
+        name: f"{about['long_name']} {style.SYMBOLS[name]}" for name, about in PARAMETERS.items()
+    }
     names |= {"label": "label", "motion": "motion"}
-    inputs = [style.plain(f"{text}: {values_text(coords[name])}") for name, text in names.items() if name in coords]
-    compared = ["one interface (μs 0.38), two shaking-table tests: θ 5 and 6°, 0.36 and 0.52 g, 1.8 and 3.5 Hz"]
+    inputs = [
+        style.plain(f"{text}: {values_text(coords[name])}")
+        for name, text in names.items()
+        if name in coords
+    ]
+    compared = [
+        "one interface (μs 0.38), two shaking-table tests: θ 5 and 6°, 0.36 and 0.52 g, 1.8 and 3.5 Hz"
+    ]
     if solved.is_recorded(result.data):
         compared.append("none under recorded motions: the rules for them extend the paper")
     sections = {

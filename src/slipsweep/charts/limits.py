@@ -7,7 +7,15 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from slipsweep.charts import style
-from slipsweep.charts.sheet import Drawing, Panel, Sheet, curve_looks, log_ticks, member_text, plot_curve
+from slipsweep.charts.sheet import (
+    Drawing,
+    Panel,
+    Sheet,
+    curve_looks,
+    log_ticks,
+    member_text,
+    plot_curve,
+)
 from slipsweep.charts.slices import NAMED, Result
 from slipsweep.charts.style import Floats, Look, Options
 from slipsweep.charts.suites import draw_suite, suite_text
@@ -17,7 +25,8 @@ from slipsweep.model.variables import LimitStatus
 from slipsweep.studies.suite_statistics import SUITE, limit_quantiles
 
 #: Most grid points of annual rates, a curve each; most displacements that are marked.
-_MOST_CURVES, _MOST_MARKS = 8, 20
+_MOST_CURVES = 8
+_MOST_MARKS = 20
 
 
 def limit(result: Result, options: Options) -> Figure:
@@ -26,7 +35,8 @@ def limit(result: Result, options: Options) -> Figure:
     single = suite and not {*result.wide} - {*SUITE, *options.at}  # nothing varies but the motion
     along = "motion" if single else ("frequency", "mu_s", "theta", "displacement")
     curves = None if suite else ("theta", "displacement", "mu_s", "case")
-    names, shown = ["limit_amplitude", "limit_status"], replace(options, more_panels=True)
+    names = ["limit_amplitude", "limit_status"]
+    shown = replace(options, more_panels=True)
     sheet = result.sheet(shown, names, along, curves=curves, keep=suite)
     for panel in sheet.panels:
         panel.axes.grid(color="0.9", which="both")
@@ -47,13 +57,23 @@ def limit(result: Result, options: Options) -> Figure:
 
 def _draw_curves(sheet: Sheet, panel: Panel) -> None:
     """The curves of a family, in circles where a discontinuity of the model sets the limit."""
-    xs, limits, states = panel.xs, panel.grid("limit_amplitude") / panel.g, panel.grid("limit_status")
-    circle: Look = {"linestyle": "none", "marker": "o", "markersize": 9, "color": "0.82", "zorder": 1.5}
+    xs = panel.xs
+    limits = panel.grid("limit_amplitude") / panel.g
+    states = panel.grid("limit_status")
+    circle: Look = {
+        "linestyle": "none",
+        "marker": "o",
+        "markersize": 9,
+        "color": "0.82",
+        "zorder": 1.5,
+    }
     for member, look in enumerate(curve_looks(len(limits))):
         line = plot_curve(panel.axes, xs, limits[member], member / len(limits), **look)
         if panel.y:
             sheet.legend[panel.member(member)] = line
-        abrupt = (states[member] >= LimitStatus.AT_MODE_JUMP) & (states[member] <= LimitStatus.AFTER_GAP)
+        abrupt = (states[member] >= LimitStatus.AT_MODE_JUMP) & (
+            states[member] <= LimitStatus.AFTER_GAP
+        )
         if abrupt.any():
             (marks,) = panel.axes.plot(xs[abrupt], limits[member][abrupt], **circle)
             sheet.remarks["set by a discontinuity\nof the model"] = marks
@@ -61,16 +81,22 @@ def _draw_curves(sheet: Sheet, panel: Panel) -> None:
 
 def _draw_motions(sheet: Sheet, panel: Panel) -> None:
     """The limits of the motions of a suite, with their median and band."""
-    xs, limits = panel.xs, panel.data["limit_amplitude"]
-    quantiles = limit_quantiles(panel.data)["limit_quantile"].transpose("quantile", ...).values / panel.g
+    xs = panel.xs
+    limits = panel.data["limit_amplitude"]
+    quantiles = (
+        limit_quantiles(panel.data)["limit_quantile"].transpose("quantile", ...).values / panel.g
+    )
     quantiles[np.isinf(quantiles)] = np.nan
     if panel.x != "motion":
         lines = limits.transpose(*SUITE, panel.x, missing_dims="ignore").values
         draw_suite(sheet, panel.axes, xs, lines / panel.g, quantiles)
         return
-    # no lines from motion to motion: a row of points for each polarity, and the quantiles across all of them
+    # no lines from motion to motion: a row of points for each polarity, and the quantiles across
+    # all of them
     ends = np.array([0.5, xs.size + 0.5])
-    draw_suite(sheet, panel.axes, ends, np.empty((0, 2)), np.repeat(quantiles.reshape(-1, 1), 2, axis=1))
+    draw_suite(
+        sheet, panel.axes, ends, np.empty((0, 2)), np.repeat(quantiles.reshape(-1, 1), 2, axis=1)
+    )
     panel.axes.set_xlim(*ends)
     points = limits.transpose("motion", ...).values.reshape(xs.size, -1)
     polarities = panel.data["polarity"].values if "polarity" in limits.dims else ()
@@ -83,11 +109,16 @@ def _draw_motions(sheet: Sheet, panel: Panel) -> None:
 def _suite_text(data: xr.Dataset) -> str:
     """What the median is of, and the motions that have no limit."""
     status = data["limit_status"].values
-    beyond, invalid = (int(np.count_nonzero(status == one)) for one in (LimitStatus.NOT_REACHED, LimitStatus.INVALID))
+    beyond, invalid = (
+        int(np.count_nonzero(status == one))
+        for one in (LimitStatus.NOT_REACHED, LimitStatus.INVALID)
+    )
     texts = [f"Median and band are of {suite_text(data['limit_amplitude'].sizes)}."]
     if beyond:
         highest = f"{float(data.attrs['maximum_amplitude']) / float(data.attrs['g']):.4g} g"
-        texts.append(f"{beyond} of {status.size} limits are above {highest}; they count as larger than all others.")
+        texts.append(
+            f"{beyond} of {status.size} limits are above {highest}; they count as larger than all others."
+        )
     if invalid:
         texts.append(f"{invalid} of {status.size} have no value and are left out.")
     return " ".join(texts)
@@ -103,45 +134,70 @@ def drawn_thresholds(data: xr.Dataset, requested: Floats) -> Floats:
 def hazard(result: Result, options: Options) -> Figure:
     """The mean annual rate of exceedance over the displacement, a curve for each grid point.
 
-    The displacements that the attribute ``marked`` has, or all if they are few, have a marker.  Curves are
-    dotted where more than half of the rate is held above the largest amplitude.
+    The displacements that the attribute ``marked`` has, or all if they are few, have a marker.
+    Curves are dotted where more than half of the rate is held above the largest amplitude.
     """
     rates = result.data
-    grid = {str(dim): size for dim, size in rates["annual_rate"].sizes.items() if dim != "threshold"}
+    grid = {
+        str(dim): size for dim, size in rates["annual_rate"].sizes.items() if dim != "threshold"
+    }
     points = [zip(grid, at, strict=True) for at in np.ndindex(*grid.values())]
-    names = [", ".join(member_text(rates, dim, at, options) for dim, at in point) for point in points]
+    names = [
+        ", ".join(member_text(rates, dim, at, options) for dim, at in point) for point in points
+    ]
     if len(names) > _MOST_CURVES:
         most = f"a chart shows {_MOST_CURVES} at most; cut axes with --at NAME=VALUE"
         raise InputError(f"{len(names)} grid points: {most}")
     wanted = rates["threshold"].values
     few = wanted.size <= _MOST_MARKS
     marks = np.isin(wanted, wanted if few else rates.attrs.get("marked", []))
-    lines, held = (rates[name].values.reshape(-1, wanted.size) for name in ("annual_rate", "held_rate"))
+    lines, held = (
+        rates[name].values.reshape(-1, wanted.size) for name in ("annual_rate", "held_rate")
+    )
     if not (lines[:, marks if marks.any() else slice(None)] > 0.0).any():
-        raise InputError("no motion exceeds any of the given displacements: there is nothing to draw")
+        raise InputError(
+            "no motion exceeds any of the given displacements: there is nothing to draw"
+        )
     drawing = Drawing(options, 1, 1, (6.4, 4.8))
     panel = drawing.grid[0, 0]
-    panel.set(xscale="log", yscale="log", xlabel="permanent displacement d (mm)",
-              ylabel="mean annual rate of u > d (1/year)")  # fmt: skip
+    panel.set(
+        xscale="log",
+        yscale="log",
+        xlabel="permanent displacement d (mm)",
+        ylabel="mean annual rate of u > d (1/year)",
+    )
     panel.grid(color="0.9", which="both")
     for look, name, line, part in zip(curve_looks(len(names)), names, lines, held, strict=True):
         shown = np.where((line > 0.0) & (wanted > 0.0), line, np.nan)
         above = part > 0.5 * line
-        joined = above | np.append(False, above[:-1]) | np.append(above[1:], False)  # no gaps between the two
+        joined = (
+            above | np.append(False, above[:-1]) | np.append(above[1:], False)
+        )  # no gaps between the two
         dashed = {"color": look["color"], "linestyle": look["linestyle"]}
         panel.plot(wanted * 1000.0, np.where(above, np.nan, shown), **dashed)
-        panel.plot(wanted * 1000.0, np.where(joined, shown, np.nan), color=look["color"], linestyle=":")
+        panel.plot(
+            wanted * 1000.0, np.where(joined, shown, np.nan), color=look["color"], linestyle=":"
+        )
         handle = {**look, "linestyle": "none"} if marks.any() else dashed
         (drawing.legend[name],) = panel.plot(wanted[marks] * 1000.0, shown[marks], **handle)
     for axis, (low, high) in ((panel.xaxis, panel.get_xlim()), (panel.yaxis, panel.get_ylim())):
         log_ticks(axis, high / low)
     if len(names) == 1:  # the caption has what the curve is of
         drawing.legend.clear()
-    texts = [style.caption(rates, options), f"hazard curve: {style.plain(rates.attrs['hazard_curve'])}"]
+    texts = [
+        style.caption(rates, options),
+        f"hazard curve: {style.plain(rates.attrs['hazard_curve'])}",
+    ]
     if few:
         texts.append("Rates are computed at the markers; between them the lines are straight.")
     if (held > 0.5 * lines).any():
         ends = [float(rates.attrs[f"{name}_range"][-1]) for name in ("amplitude", "hazard_curve")]
-        what = "the largest amplitude of the sweep" if ends[0] < ends[1] else "the end of the hazard curve"
-        texts.append(f"Dotted: more than half of the rate comes from above {what}, where P is held constant.")
+        what = (
+            "the largest amplitude of the sweep"
+            if ends[0] < ends[1]
+            else "the end of the hazard curve"
+        )
+        texts.append(
+            f"Dotted: more than half of the rate comes from above {what}, where P is held constant."
+        )
     return drawing.finish(texts)

@@ -23,45 +23,67 @@ from slipsweep.files.selection import axis_labels, axis_numbers
 from slipsweep.model.variables import Validity
 
 #: Dashes and markers of the curves of a family, and how many markers a curve has.
-_DASHES = ("-", (0, (7, 2)), (0, (3, 1.5)), (0, (7, 2, 1.5, 2)), (0, (7, 2, 1.5, 2, 1.5, 2)), (0, (12, 3)))
+_DASHES = (
+    "-",
+    (0, (7, 2)),
+    (0, (3, 1.5)),
+    (0, (7, 2, 1.5, 2)),
+    (0, (7, 2, 1.5, 2, 1.5, 2)),
+    (0, (12, 3)),
+)
 _MARKERS = ("o", "s", "^", "D", "v", "x")
 _MARKED = 7
 
-#: Width of a figure of one panel, inches; characters of a caption in an inch, and in a label's line of a small panel.
-_WIDTH, _CHARACTERS, _LABEL = 7.0, 15, 26
+#: Width of a figure of one panel, inches; characters of a caption in an inch, and in a label's line
+#: of a small panel.
+_WIDTH = 7.0
+_CHARACTERS = 15
+_LABEL = 26
 
 #: Height of a line of a caption or legend, inches, and lines that the usual height has a place for.
-_LINE, _LINES = 0.165, 4
+_LINE = 0.165
+_LINES = 4
 
 
 class Drawing:
     """A figure of panels with a legend, in which what several panels have is once, and a caption.
 
-    `options.width` scales the size in inches, `options.ax` is drawn in instead of a new figure; `shared` goes to
-    `Figure.subplots`.  Remarks come last in the legend; notes are sentences for the caption.
+    `options.width` scales the size in inches, `options.ax` is drawn in instead of a new figure;
+    `shared` goes to `Figure.subplots`.  Remarks come last in the legend; notes are sentences for
+    the caption.
     """
 
-    def __init__(self, options: Options, rows: int, columns: int, size: tuple[float, float], **shared: Any) -> None:
-        self.options, axes = options, options.ax
+    def __init__(
+        self, options: Options, rows: int, columns: int, size: tuple[float, float], **shared: Any
+    ) -> None:
+        self.options = options
+        axes = options.ax
         if axes is None:
             factor = 1.0 if options.inches is None else options.inches / size[0]
             self.figure = Figure(figsize=(size[0] * factor, size[1] * factor), layout="constrained")
-            self.grid = self.figure.subplots(rows, columns, **{"sharex": True, "sharey": True, **shared}, squeeze=False)
+            self.grid = self.figure.subplots(
+                rows, columns, **{"sharex": True, "sharey": True, **shared}, squeeze=False
+            )
         else:
             root = axes.get_figure(root=True) if isinstance(axes, Axes) else None
             if root is None:
                 raise InputError(f"ax = {axes!r}: must be the axes of a matplotlib figure")
             if rows * columns > 1:
-                raise InputError(f"ax: is one panel, and this chart has {rows * columns}; leave out ax")
-            self.figure, self.grid = root, np.array([[axes]], dtype=object)
+                raise InputError(
+                    f"ax: is one panel, and this chart has {rows * columns}; leave out ax"
+                )
+            self.figure = root
+            self.grid = np.array([[axes]], dtype=object)
         self.legend: dict[str, Artist] = {}
         self.remarks: dict[str, Artist] = {}
         self.notes: list[str] = []
 
     def finish(self, texts: Sequence[str], beside: bool = True) -> Figure:
         """Draw the legend, beside or above the panels, and a caption of `texts` and the notes under them."""
-        entries, axes = self.legend | self.remarks, self.options.ax
-        handles, look = (list(entries.values()), list(entries)), Look(fontsize="small", frameon=False)
+        entries = self.legend | self.remarks
+        axes = self.options.ax
+        handles = (list(entries.values()), list(entries))
+        look = Look(fontsize="small", frameon=False)
         width, height = self.figure.get_size_inches()
         text_width = width * 10.0 / self.options.font  # inches of text of 10 points
         available = axes.get_window_extent().width / self.figure.dpi if axes else text_width
@@ -71,20 +93,32 @@ class Drawing:
         if axes is not None:
             right = any(other.yaxis.get_ticks_position() == "right" for other in axes.child_axes)
             if entries:
-                axes.legend(*handles, loc="upper left", bbox_to_anchor=(1.2 if right else 1.02, 1.0), **look)
+                axes.legend(
+                    *handles, loc="upper left", bbox_to_anchor=(1.2 if right else 1.02, 1.0), **look
+                )
             axes.annotate(
-                "\n".join(caption), (0.5, 0.0), (0.0, -4.0), xycoords=axes.xaxis.label, textcoords="offset points",
-                ha="center", va="top", fontsize="x-small", annotation_clip=False,
-            )  # fmt: skip
+                "\n".join(caption),
+                (0.5, 0.0),
+                (0.0, -4.0),
+                xycoords=axes.xaxis.label,
+                textcoords="offset points",
+                ha="center",
+                va="top",
+                fontsize="x-small",
+                annotation_clip=False,
+            )
         else:
             self._set_small()
             beside = beside and width > 5.0
             columns = 1 if beside else max(1, int(text_width / 2.2))
             if entries:
                 self.figure.legend(
-                    *handles, loc="outside right upper" if beside else "outside upper center",
-                    ncols=columns, handlelength=3.2, **look,
-                )  # fmt: skip
+                    *handles,
+                    loc="outside right upper" if beside else "outside upper center",
+                    ncols=columns,
+                    handlelength=3.2,
+                    **look,
+                )
             self.figure.supxlabel("\n".join(caption), fontsize="small")
             longest = max((text.count("\n") + 1 for text in entries), default=0)
             lines = 0 if beside or not entries else math.ceil(len(entries) / columns) * longest - 1
@@ -114,7 +148,9 @@ def _without_colour(figure: Figure) -> None:
             given = artist.get_cmap()
             ends = {"under": given.get_under(), "over": given.get_over()}
             shades = ListedColormap(style.to_grey(given(np.arange(given.N))))
-            artist.set_cmap(shades.with_extremes(**{end: style.to_grey(one)[0] for end, one in ends.items()}))
+            artist.set_cmap(
+                shades.with_extremes(**{end: style.to_grey(one)[0] for end, one in ends.items()})
+            )
             continue
         for kind in ("color", "markerfacecolor", "markeredgecolor", "facecolor", "edgecolor"):
             grey = style.to_grey(getattr(artist, f"get_{kind}", list)())
@@ -126,15 +162,23 @@ class Panel:
     """A part of a sheet's slice, `at` a row and column, and the axes it is drawn in."""
 
     def __init__(self, sheet: "Sheet", axes: Axes, at: tuple[int, ...]) -> None:
-        self._sheet, self._where = sheet, dict(zip(sheet.along, at[::-1], strict=False))
-        self.axes, self.x, self.y, self.options = axes, sheet.x, sheet.y, sheet.options
+        self._sheet = sheet
+        self._where = dict(zip(sheet.along, at[::-1], strict=False))
+        self.axes = axes
+        self.x = sheet.x
+        self.y = sheet.y
+        self.options = sheet.options
         self.g = float(sheet.data.attrs["g"])
-        names = [member_text(sheet.data, dim, index, self.options) for dim, index in self._where.items()]
+        names = [
+            member_text(sheet.data, dim, index, self.options) for dim, index in self._where.items()
+        ]
         if names:
             axes.set_title(", ".join(names), fontsize="medium")
         # the values along x and y, in the units that they are drawn in
         self.xs, self.ys = (
-            axis_numbers(self.data, name) * self.options.scale(name, self.g) if name else np.zeros(0)
+            axis_numbers(self.data, name) * self.options.scale(name, self.g)
+            if name
+            else np.zeros(0)
             for name in (self.x, self.y)
         )
 
@@ -145,8 +189,10 @@ class Panel:
 
     def grid(self, values: str | xr.DataArray, *dims: str | None) -> Any:
         """Values over (y, x) or other dimensions, in that order, repeated along those they lack; None has length 1."""
-        data, dims = self.data, dims or (self.y, self.x)
-        array, named = data[values] if isinstance(values, str) else values, [dim for dim in dims if dim]
+        data = self.data
+        dims = dims or (self.y, self.x)
+        array = data[values] if isinstance(values, str) else values
+        named = [dim for dim in dims if dim]
         lacking = {dim: data.sizes.get(dim, 1) for dim in named if dim not in array.dims}
         full = array.variable.set_dims({**lacking, **array.sizes}).transpose(*named)
         return full.values.reshape([full.sizes[dim] if dim else 1 for dim in dims])
@@ -167,23 +213,41 @@ class Sheet(Drawing):
     `x` and `y` are the axes of a map; of curves `y` is the curve parameter, or None.
     """
 
-    def __init__(self, data: xr.Dataset, x: str, y: str | None, options: Options, along: Sequence[str]) -> None:
+    def __init__(
+        self, data: xr.Dataset, x: str, y: str | None, options: Options, along: Sequence[str]
+    ) -> None:
         columns, rows = [*(data.sizes[dim] for dim in along), 1, 1][:2]
-        size = (_WIDTH, 5.3) if rows == columns == 1 else (max(_WIDTH, 2.0 + 2.7 * columns), 2.0 + 2.5 * rows)
+        size = (
+            (_WIDTH, 5.3)
+            if rows == columns == 1
+            else (max(_WIDTH, 2.0 + 2.7 * columns), 2.0 + 2.5 * rows)
+        )
         super().__init__(options, rows, columns, size)
-        self.data, self.x, self.y, self.along = data, x, y, along
+        self.data = data
+        self.x = x
+        self.y = y
+        self.along = along
         self.panels = [Panel(self, axes, at) for at, axes in np.ndenumerate(self.grid)]
 
     def set_axis(self, side: str) -> None:
         """Scale, ticks and label of an axis, and the acceleration in the other unit on the opposite side."""
-        name, values = (self.x, self.panels[0].xs) if side == "x" else (str(self.y), self.panels[0].ys)
+        name, values = (
+            (self.x, self.panels[0].xs) if side == "x" else (str(self.y), self.panels[0].ys)
+        )
         for panel in self.panels:
             axes = panel.axes
-            axes.set(**{f"{side}lim": (values[0], values[-1]), f"{side}label": style.axis_label(name, self.options)})
+            axes.set(
+                **{
+                    f"{side}lim": (values[0], values[-1]),
+                    f"{side}label": style.axis_label(name, self.options),
+                }
+            )
             if name not in ("theta", "phi") and is_log(values):
                 axes.set(**{f"{side}scale": "log"})
                 log_ticks(getattr(axes, f"{side}axis"), values[-1] / values[0])
-            if style.is_acceleration(name) and axes in (self.grid[:, -1] if side == "y" else self.grid[0]):
+            if style.is_acceleration(name) and axes in (
+                self.grid[:, -1] if side == "y" else self.grid[0]
+            ):
                 _second_scale(axes, side, panel.g, self.options.units, style.SYMBOLS[name])
 
     def note_left_out(self, name: str, *others: xr.DataArray) -> None:
@@ -192,15 +256,20 @@ class Sheet(Drawing):
         groups: dict[str, list[str]] = {}
         for flag, text in solved.LEFT_OUT.items():
             if any(solved.has_flags(one, flag).any() for one in flags):
-                drawn = self.options.show_cautions and not (name == solved.DISPLACEMENT and flag == Validity.UPSLOPE)
+                drawn = self.options.show_cautions and not (
+                    name == solved.DISPLACEMENT and flag == Validity.UPSLOPE
+                )
                 groups.setdefault("Drawn on request" if drawn else "Left out", []).append(text)
-        self.notes += [f"{heading}: values flagged {' or '.join(texts)}." for heading, texts in groups.items()]
+        self.notes += [
+            f"{heading}: values flagged {' or '.join(texts)}." for heading, texts in groups.items()
+        ]
 
     def show(self, name: str, marked: str, always: bool = False) -> None:
         """Add to the slice what charts of a result draw.
 
-        ``drawn``, the values that may be drawn; `thresholds`; of displacements ``newmark``, that of Newmark's block,
-        and ``unsound``, where there is a trend that no block has.  Notes compare the two, and say how much is `marked`.
+        ``drawn``, the values that may be drawn; `thresholds`; of displacements ``newmark``, that of
+        Newmark's block, and ``unsound``, where there is a trend that no block has.  Notes compare
+        the two, and say how much is `marked`.
         """
         drawn = solved.reliable(self.data, name, self.options.show_cautions)
         self.data = self.data.merge(solved.thresholds(self.data, always)).assign(drawn=drawn)
@@ -219,7 +288,9 @@ class Sheet(Drawing):
         self.data["unsound"], trends = solved.unsound(self.data, drawn, theirs)
         if trends:
             share = solved.percent(int(self.data["unsound"].sum()) / int((drawn > 0).sum()))
-            self.notes.append(f"{marked}: {share} of the sliding cells shown. {trends[0].upper()}{trends[1:]}.")
+            self.notes.append(
+                f"{marked}: {share} of the sliding cells shown. {trends[0].upper()}{trends[1:]}."
+            )
         if "limit_line" in self.data and "validity" in self.data:
             continuous = self.data["amplitude"] > self.data["limit_line"]
             text = solved.estimated(self.data, drawn, continuous.reset_coords(drop=True))
@@ -230,10 +301,17 @@ class Sheet(Drawing):
         if self.options.ax is None:
             for panel in self.panels:
                 panel.axes.label_outer()
-        picked = "".join(f"{dim} {style.plain(label)}: " for dim, label in self.data.attrs.get("picked", {}).items())
+        picked = "".join(
+            f"{dim} {style.plain(label)}: "
+            for dim, label in self.data.attrs.get("picked", {}).items()
+        )
         text = f"{picked}{style.caption(self.data, self.options)}; {self.data.attrs.get('source', 'slipsweep')}"
         cases = []
-        own = [name for name in style.SYMBOLS if name in self.data.coords and self.data[name].dims == ("case",)]
+        own = [
+            name
+            for name in style.SYMBOLS
+            if name in self.data.coords and self.data[name].dims == ("case",)
+        ]
         for at in range(self.data.sizes.get("case", 0)):
             values = ", ".join(member_text(self.data, name, at, self.options) for name in own)
             cases.append(f"{member_text(self.data, 'case', at, self.options)}: {values}.")
@@ -252,14 +330,17 @@ def is_log(values: Floats) -> bool:
     """Whether an axis is spaced by a constant factor rather than a constant step."""
     if values.size < 3 or values[0] <= 0 or values[-1] < 3 * values[0]:
         return False
-    steps, factors = np.diff(values), np.diff(np.log(values))
+    steps = np.diff(values)
+    factors = np.diff(np.log(values))
     return bool(np.ptp(factors) / factors.mean() < np.ptp(steps) / steps.mean())
 
 
 def log_ticks(axis: Any, span: float) -> None:
     """Ticks of a logarithmic axis over some ratio of its ends, with numbers as people write them."""
     axis.set_major_locator(LogLocator(subs=(1, 2, 5) if span < 2000 else (1,)))
-    axis.set_major_formatter(lambda value, _: f"{value:,.0f}".replace(",", " ") if value >= 1e4 else f"{value:g}")
+    axis.set_major_formatter(
+        lambda value, _: f"{value:,.0f}".replace(",", " ") if value >= 1e4 else f"{value:g}"
+    )
     axis.set_minor_formatter(NullFormatter())
 
 
@@ -267,7 +348,9 @@ def _second_scale(axes: Axes, side: str, g: float, units: str, symbol: str) -> N
     """An acceleration in the other unit, on the other side, with round values of its own."""
     factor, text = (g, f"{symbol} (m/s²)") if units == "g" else (1 / g, f"{symbol} (g)")
     add: Any = axes.secondary_yaxis if side == "y" else axes.secondary_xaxis
-    other = add("right" if side == "y" else "top", functions=(lambda a: a * factor, lambda a: a / factor))
+    other = add(
+        "right" if side == "y" else "top", functions=(lambda a: a * factor, lambda a: a / factor)
+    )
     low, high = getattr(axes, f"get_{side}lim")()
     # it would take them when it is drawn, too late for the layout to leave space for its numbers
     other.set(**{f"{side}lim": (low * factor, high * factor), f"{side}label": text})
@@ -275,17 +358,21 @@ def _second_scale(axes: Axes, side: str, g: float, units: str, symbol: str) -> N
         log_ticks(getattr(other, f"{side}axis"), high / low)
 
 
-def log_axis(axes: Axes, values: Floats, label: str, least: float | None = 1.0, zeros: bool = False) -> float:
+def log_axis(
+    axes: Axes, values: Floats, label: str, least: float | None = 1.0, zeros: bool = False
+) -> float:
     """A logarithmic ordinate that shows what is above `least`, and no more than seven decades.
 
-    With `zeros` curves come from below the axis: it begins at `least`.  Returns a number below the end of the axis,
-    that may be drawn for zero.  InputError: no value is above zero.
+    With `zeros` curves come from below the axis: it begins at `least`.  Returns a number below the
+    end of the axis, that may be drawn for zero.  InputError: no value is above zero.
     """
     finite = values[np.isfinite(values)]
     there = finite[finite > 0]
     if not there.size:
         what = "no value above zero" if finite.size else "no value"
-        raise InputError(f"{label}: {what} in this slice, and the axis is logarithmic; choose another slice (--at)")
+        raise InputError(
+            f"{label}: {what} in this slice, and the axis is logarithmic; choose another slice (--at)"
+        )
     high = float(there.max())
     low = max(float(there.min()), high * 1e-7)
     if least is not None and high > 10 * least:
@@ -302,23 +389,37 @@ def curve_looks(number: int) -> list[Look]:
     # not up to the yellow end, which is faint on white and in grey
     colours = mpl.colormaps["viridis"](np.linspace(0, 0.68, number))
     return [
-        {"color": tuple(colour), "linestyle": dash, "marker": marker, "markersize": 4, "markerfacecolor": "white"}
-        for colour, dash, marker in zip(colours, itertools.cycle(_DASHES), itertools.cycle(_MARKERS), strict=False)
+        {
+            "color": tuple(colour),
+            "linestyle": dash,
+            "marker": marker,
+            "markersize": 4,
+            "markerfacecolor": "white",
+        }
+        for colour, dash, marker in zip(
+            colours, itertools.cycle(_DASHES), itertools.cycle(_MARKERS), strict=False
+        )
     ]
 
 
 def plot_curve(axes: Axes, xs: Floats, ys: Floats, offset: float = 0.0, **look: Any) -> Any:
     """Draw a line with a few markers, and one on each value that has no neighbour to be joined with.
 
-    `offset` moves the markers by that part of their distance.  Zeros leave gaps where the ordinate is logarithmic.
+    `offset` moves the markers by that part of their distance.  Zeros leave gaps where the ordinate
+    is logarithmic.
     """
     if axes.get_yscale() == "log":
         ys = np.where(ys > 0, ys, np.nan)
     there = np.concatenate([[False], np.isfinite(ys), [False]])
     single = np.flatnonzero(there[1:-1] & ~there[:-2] & ~there[2:])
     inside = np.flatnonzero(there[1:-1])
-    regular = inside[((np.arange(_MARKED) + offset) / _MARKED * inside.size).astype(int)] if inside.size else inside
+    regular = (
+        inside[((np.arange(_MARKED) + offset) / _MARKED * inside.size).astype(int)]
+        if inside.size
+        else inside
+    )
     if "marker" not in look:
-        look, regular = {**look, "marker": "." if single.size else ""}, regular[:0]
+        look = {**look, "marker": "." if single.size else ""}
+        regular = regular[:0]
     (line,) = axes.plot(xs, ys, markevery=sorted({*regular.tolist(), *single.tolist()}), **look)
     return line

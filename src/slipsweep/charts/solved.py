@@ -26,9 +26,10 @@ DRIVES = ("amplitude", "displacement_amplitude")
 
 DISPLACEMENT = "permanent_displacement"
 
-#: Most cells of a result that are looked at for what is unsound, and of one whose cells take ten times as long or more:
-#: by steps, or under another waveform than a sine.
-_LOOKED_AT, _LOOKED_AT_OTHERS = 250_000, 25_000
+#: Most cells of a result that are looked at for what is unsound, and of one whose cells take ten
+#: times as long or more: by steps, or under another waveform than a sine.
+_LOOKED_AT = 250_000
+_LOOKED_AT_OTHERS = 25_000
 
 _BLOCK = ("theta", "mu_s", "yield_acceleration")
 
@@ -50,7 +51,11 @@ def is_newmark(data: xr.Dataset) -> bool:
 
 
 def solve(
-    data: xr.Dataset, names: Iterable[str], model: Model | None = None, motion: Any = None, **changed: Any
+    data: xr.Dataset,
+    names: Iterable[str],
+    model: Model | None = None,
+    motion: Any = None,
+    **changed: Any,
 ) -> xr.Dataset:
     """Solve the cells of a slice as its result was, or by another model or parameters; None: the model's estimate."""
     chosen = model or MODELS.from_attributes(data.attrs)
@@ -64,7 +69,9 @@ def solve(
         **given,
         model=chosen,
         excitation=motion or WAVEFORMS.from_attributes(data.attrs),
-        solver=SOLVERS.from_attributes(data.attrs) if SOLVERS.attribute in data.attrs else SOLVERS.default,
+        solver=SOLVERS.from_attributes(data.attrs)
+        if SOLVERS.attribute in data.attrs
+        else SOLVERS.default,
         variables=list(names),
     )
 
@@ -85,8 +92,8 @@ def with_amplitude(data: xr.Dataset) -> xr.Dataset:
 def thresholds(data: xr.Dataset, always: bool = False) -> xr.Dataset:
     """Accelerations of yield and of the mode limit (Eq. 7) of a slice, m/s², along the dimensions they depend on.
 
-    ``yield_line`` and, but for Newmark's block where not `always`, ``limit_line``; NaN where the block slides under
-    its own weight.  None for a record: each of its pulses has its own peak.
+    ``yield_line`` and, but for Newmark's block where not `always`, ``limit_line``; NaN where the
+    block slides under its own weight.  None for a record: each of its pulses has its own peak.
     """
     if is_recorded(data) and "half_wave_peak" not in data:
         return xr.Dataset()
@@ -95,7 +102,9 @@ def thresholds(data: xr.Dataset, always: bool = False) -> xr.Dataset:
         return xr.Dataset({"yield_line": data["yield_coefficient"] * g}).reset_coords(drop=True)
     given = {name: _bare(data[name]) for name in _BLOCK if name in data.coords}
     # neither depends on the amplitude, nor on what it is taken for otherwise
-    found = friction_parameters(amplitude=0.0, delta_mu=0.0, decay_rate=0.0, model=Mendez(g=g), **given)
+    found = friction_parameters(
+        amplitude=0.0, delta_mu=0.0, decay_rate=0.0, model=Mendez(g=g), **given
+    )
     lines = {"yield_line": found["yield_acceleration"].where(lambda onset: onset > 0)}
     if always or not is_newmark(data):
         lines["limit_line"] = found["limiting_acceleration"].where(found["validity"] == 0)
@@ -123,34 +132,49 @@ def reliable(results: xr.Dataset, name: str, show_cautions: bool = False) -> xr.
     return values.where(shown).transpose(*values.dims)
 
 
-def unsound(data: xr.Dataset, drawn: xr.DataArray, theirs: xr.DataArray | None) -> tuple[xr.DataArray, str]:
+def unsound(
+    data: xr.Dataset, drawn: xr.DataArray, theirs: xr.DataArray | None
+) -> tuple[xr.DataArray, str]:
     """Where the displacements `drawn` of a slice have a trend that no block has, and the trends and shares in words.
 
-    One is smaller than at an amplitude that is 1 % smaller, of recorded motions than at the next smaller amplitude of
-    the slice; or it is less than half of that of Newmark's block, `theirs`.
+    One is smaller than at an amplitude that is 1 % smaller, of recorded motions than at the next
+    smaller amplitude of the slice; or it is less than half of that of Newmark's block, `theirs`.
     """
     ours = data[DISPLACEMENT]
-    drive = next((name for name in ("displacement_amplitude", *STRENGTHS) if name in data.coords), "")
+    drive = next(
+        (name for name in ("displacement_amplitude", *STRENGTHS) if name in data.coords), ""
+    )
     if is_recorded(data):
         before = ours.shift({drive: 1}) if drive in ours.dims else ours
     else:
         # without the coordinate, by which the cells would not be the same
-        before = solve(data, [DISPLACEMENT], **{drive: _bare(data[drive] * 0.99)})[DISPLACEMENT].drop_vars(drive)
+        before = solve(data, [DISPLACEMENT], **{drive: _bare(data[drive] * 0.99)})[
+            DISPLACEMENT
+        ].drop_vars(drive)
     trends = {"falls with A": ours < before * (1 - 1e-9)}  # less is rounding
     if theirs is not None:
         trends["lies below half of Newmark's"] = ours < 0.5 * theirs
-    slides, cells, parts = drawn > 0, xr.zeros_like(drawn, bool), []
+    slides = drawn > 0
+    cells = xr.zeros_like(drawn, bool)
+    parts = []
     for text, trend in trends.items():
         cells = cells | (found := trend & slides)
-        parts += [f"{text} in {percent(int(found.sum()) / int(slides.sum()))}"] if found.any() else []
-    text = f"the displacement {' and '.join(parts)} of the sliding cells, a trend that no block has" if parts else ""
+        parts += (
+            [f"{text} in {percent(int(found.sum()) / int(slides.sum()))}"] if found.any() else []
+        )
+    text = (
+        f"the displacement {' and '.join(parts)} of the sliding cells, a trend that no block has"
+        if parts
+        else ""
+    )
     return cells.transpose(*drawn.dims), text
 
 
 def unsound_texts(results: xr.Dataset) -> list[str]:
     """What a design must not rest on: trends that no block has, and continuous sliding with estimated friction.
 
-    Of many cells some are counted, evenly spaced, which is said; of results that say neither, nothing is said.
+    Of many cells some are counted, evenly spaced, which is said; of results that say neither,
+    nothing is said.
     """
     drives = {*STRENGTHS, "displacement_amplitude"}
     if DISPLACEMENT not in results or drives.isdisjoint(results.coords) or is_newmark(results):
@@ -161,7 +185,9 @@ def unsound_texts(results: xr.Dataset) -> list[str]:
     while some[DISPLACEMENT].size > (_LOOKED_AT_OTHERS if others else _LOOKED_AT):
         sizes = some[DISPLACEMENT].sizes
         some = some.isel({max(sizes, key=lambda dim: sizes[dim]): slice(1, None, 2)})
-    counted = "" if some is results else f" (counted in {some[DISPLACEMENT].size} cells, evenly spaced)"
+    counted = (
+        "" if some is results else f" (counted in {some[DISPLACEMENT].size} cells, evenly spaced)"
+    )
     some = some.load()
     drawn = reliable(some, DISPLACEMENT)
     texts = [unsound(some.assign({DISPLACEMENT: drawn}), drawn, newmark(some))[1]]
@@ -177,31 +203,45 @@ def estimated(data: xr.Dataset, drawn: xr.DataArray, continuous: xr.DataArray) -
     if not cells.any():
         return ""
     share = percent(int(cells.sum()) / int(slides.sum()))
-    return f"{share} of the sliding cells slide continuously with estimated friction: not for design"
+    return (
+        f"{share} of the sliding cells slide continuously with estimated friction: not for design"
+    )
 
 
 def why_nothing_slides(data: xr.Dataset, tally: Tally) -> str:
     """The likely reason why every cell of a sweep is stuck or has no value; empty where one slides."""
-    modes, coords = tally.modes or {}, data.coords
+    modes = tally.modes or {}
+    coords = data.coords
     if not modes or modes[SlidingMode.STICK_SLIP] + modes[SlidingMode.CONTINUOUS]:
         return ""
     if not modes[SlidingMode.STUCK]:
         flags = {flag: count for flag, count in (tally.flags or {}).items() if flag in VALUELESS}
-        why = max(flags, key=lambda flag: flags[flag]).text if flags else "validity is not among the variables"
+        why = (
+            max(flags, key=lambda flag: flags[flag]).text
+            if flags
+            else "validity is not among the variables"
+        )
         mu_s = float(coords["mu_s"].min()) if "mu_s" in coords else 0.0
         is_angle = mu_s > 3.0 and "phi" not in coords
-        return f"no cell has a value: {why}" + (f"; did you mean phi = {mu_s:.6g}?" if is_angle else "")
+        return f"no cell has a value: {why}" + (
+            f"; did you mean phi = {mu_s:.6g}?" if is_angle else ""
+        )
     g = float(data.attrs["g"])
-    smallest = {name: float(coords[name].min()) for name in ("yield_acceleration", "mu_s") if name in coords}
+    smallest = {
+        name: float(coords[name].min()) for name in ("yield_acceleration", "mu_s") if name in coords
+    }
     if "mu_s" in smallest and "theta" in coords:
         coulomb = g * math.tan(math.atan(smallest["mu_s"]) - math.radians(coords["theta"].max()))
         smallest.setdefault("yield_acceleration", coulomb)
     if "amplitude" not in coords or "yield_acceleration" not in smallest:
         return "no cell slides"
-    least, largest = smallest["yield_acceleration"], float(coords["amplitude"].max())
+    least = smallest["yield_acceleration"]
+    largest = float(coords["amplitude"].max())
     hint = '; did you mean units = "g"?' if largest <= 3.0 and largest * g > least else ""
     texts = (f"{one:.6g} m/s2 ({one / g:.4g} g)" for one in (largest, least))
-    return "no cell slides: largest amplitude {}, smallest yield acceleration {}".format(*texts) + hint
+    return (
+        "no cell slides: largest amplitude {}, smallest yield acceleration {}".format(*texts) + hint
+    )
 
 
 def percent(share: float) -> str:

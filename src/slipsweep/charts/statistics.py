@@ -29,7 +29,9 @@ _FIRST_ORDER: Look = {"linestyle": (0, (3, 1.5)), "linewidth": 1.0}
 def fragility(result: Result, options: Options) -> Figure:
     """The probability of exceeding a displacement over one axis, a curve for each threshold."""
     if options.levels:
-        raise InputError(f"{result.name}: levels: not with statistics, whose thresholds are those in the file")
+        raise InputError(
+            f"{result.name}: levels: not with statistics, whose thresholds are those in the file"
+        )
     names = ["exceedance_probability", "valueless_share"]
     return draw_fragility(result.sheet(options, names, _AXES, curves=["threshold"]))
 
@@ -43,7 +45,9 @@ def draw_fragility(sheet: Sheet) -> Figure:
         curves = panel.grid("exceedance_probability")
         for member, (curve, look) in enumerate(zip(curves, curve_looks(len(curves)), strict=True)):
             text = panel.member(member) or f"d = {fixed}"
-            sheet.legend[text] = plot_curve(panel.axes, panel.xs, curve, member / len(curves), label=text, **look)
+            sheet.legend[text] = plot_curve(
+                panel.axes, panel.xs, curve, member / len(curves), label=text, **look
+            )
         shares = panel.grid("valueless_share")
         if shares.any():
             dotted = panel.axes.plot(panel.xs, shares.max(axis=0), color="0.4", linestyle=":")
@@ -55,20 +59,29 @@ def draw_fragility(sheet: Sheet) -> Figure:
 
 def quantiles(result: Result, options: Options) -> Figure:
     """Bands between quantiles of the permanent displacement over one axis."""
-    sheet = result.sheet(options, ["displacement_quantile", "valueless_share"], _AXES, keep=["quantile"])
+    sheet = result.sheet(
+        options, ["displacement_quantile", "valueless_share"], _AXES, keep=["quantile"]
+    )
     everything = sheet.data["displacement_quantile"].values * 1000.0
     shares = np.atleast_1d(sheet.data["quantile"].values)
     for panel in sheet.panels:
         floor = log_axis(panel.axes, everything, "permanent displacement (mm)", zeros=True)
         values = panel.grid("displacement_quantile", "quantile", panel.x) * 1000.0
-        shown, xs, middle = np.maximum(values, floor), panel.xs, shares.size // 2
+        shown = np.maximum(values, floor)
+        xs = panel.xs
+        middle = shares.size // 2
         for low in range(middle):
-            high, colour = shares.size - 1 - low, mpl.colormaps["Blues"](0.2 + 0.3 * low / middle)
-            band = panel.axes.fill_between(xs, shown[low], shown[high], facecolor=colour, linewidth=0)
+            high = shares.size - 1 - low
+            colour = mpl.colormaps["Blues"](0.2 + 0.3 * low / middle)
+            band = panel.axes.fill_between(
+                xs, shown[low], shown[high], facecolor=colour, linewidth=0
+            )
             sheet.legend[f"{shares[low] * 100:g} to {shares[high] * 100:g} %"] = band
         if shares.size % 2:
             text = "median" if shares[middle] == 0.5 else f"{shares[middle] * 100:g} %"
-            sheet.legend[text] = panel.axes.plot(xs, shown[middle], color=BLUE, linewidth=1.8, label=text)[0]
+            sheet.legend[text] = panel.axes.plot(
+                xs, shown[middle], color=BLUE, linewidth=1.8, label=text
+            )[0]
     if (most := float(sheet.data["valueless_share"].max())) > 0:
         sheet.notes.append(f"Without a value: up to {most:.1%} of the samples.")
     return sheet.done()
@@ -77,18 +90,29 @@ def quantiles(result: Result, options: Options) -> Figure:
 def sensitivity(result: Result, options: Options) -> Figure:
     """Sobol indices of every input with their 95 % intervals: curves over an axis, or bars at one grid point."""
     if "total_index" not in result.variables:
-        raise InputError(f"{result.name}: holds no Sobol indices; sensitivity = true in [uncertainty] computes them")
+        raise InputError(
+            f"{result.name}: holds no Sobol indices; sensitivity = true in [uncertainty] computes them"
+        )
     names = [name for one in _INDICES for name in one[:2]] + ["sensitivity_status"]
-    left = [dim for dim in result.wide if dim in PARAMETERS and dim in result.data["total_index"].dims]
+    left = [
+        dim for dim in result.wide if dim in PARAMETERS and dim in result.data["total_index"].dims
+    ]
     bars = options.x is None and not {*left} - {*options.at, *options.panels}
     sheet = result.sheet(options, names, "input" if bars else _AXES, keep=["bound", "input"])
     status = {*sheet.data["sensitivity_status"].values.flat}
-    reasons = [one.text for one in SensitivityStatus if one in status and one != SensitivityStatus.COMPUTED]
+    reasons = [
+        one.text for one in SensitivityStatus if one in status and one != SensitivityStatus.COMPUTED
+    ]
     if not np.isfinite(sheet.data["total_index"]).any():
-        raise InputError(f"no Sobol indices in this slice: {'; '.join(reasons)}; choose another slice (--at)")
+        raise InputError(
+            f"no Sobol indices in this slice: {'; '.join(reasons)}; choose another slice (--at)"
+        )
     sheet.notes += [f"No indices where {text}." for text in reasons]
     inputs = axis_labels(sheet.data, "input")
-    symbols = [" + ".join(style.SYMBOLS.get(one, style.plain(one)) for one in name.split("+")) for name in inputs]
+    symbols = [
+        " + ".join(style.SYMBOLS.get(one, style.plain(one)) for one in name.split("+"))
+        for name in inputs
+    ]
     if bars:
         _draw_bars(sheet, symbols)
         return sheet.done()
@@ -97,11 +121,17 @@ def sensitivity(result: Result, options: Options) -> Figure:
         total, first = (panel.grid(name, "input", panel.x) for name, *_ in _INDICES)
         low, high = panel.grid("total_interval", "bound", "input", panel.x)
         for at, look in enumerate(curve_looks(len(inputs))):
-            panel.axes.fill_between(panel.xs, low[at], high[at], color=look["color"], alpha=0.15, linewidth=0)
+            panel.axes.fill_between(
+                panel.xs, low[at], high[at], color=look["color"], alpha=0.15, linewidth=0
+            )
             solid = {**look, "linestyle": "-", "label": symbols[at]}
-            sheet.legend[symbols[at]] = plot_curve(panel.axes, panel.xs, total[at], at / len(inputs), **solid)
+            sheet.legend[symbols[at]] = plot_curve(
+                panel.axes, panel.xs, total[at], at / len(inputs), **solid
+            )
             panel.axes.plot(panel.xs, first[at], color=look["color"], **_FIRST_ORDER)
-        panel.axes.set(ylim=_ends(sheet, intervals=False), ylabel="Sobol index of the permanent displacement")
+        panel.axes.set(
+            ylim=_ends(sheet, intervals=False), ylabel="Sobol index of the permanent displacement"
+        )
     sheet.remarks["total"] = Line2D([], [], color="0.3")
     sheet.remarks["first order"] = Line2D([], [], color="0.3", **_FIRST_ORDER)
     sheet.remarks["95 % interval (total)"] = Patch(alpha=0.15, linewidth=0, color="0.3")
@@ -124,13 +154,19 @@ def _draw_bars(sheet: Sheet, symbols: list[str]) -> None:
         panel.axes.set_yticks(np.arange(len(order)), [symbols[at] for at in order])
         panel.axes.axvline(0, color="0.6", linewidth=0.8, zorder=0)
         label = "Sobol index of the permanent displacement"
-        panel.axes.set(ylim=(-0.6, len(order) - 0.4), xlim=_ends(sheet, intervals=True), xlabel=label)
+        panel.axes.set(
+            ylim=(-0.6, len(order) - 0.4), xlim=_ends(sheet, intervals=True), xlabel=label
+        )
     sheet.legend["95 % interval"] = Line2D([], [], color="black", marker="|", markersize=6)
 
 
 def _ends(sheet: Sheet, intervals: bool) -> tuple[float, float]:
     """Ends of the axis of indices: 0 to 1 and what lies beyond, of intervals not more than half as much again."""
     values = [sheet.data[name].values.ravel() for name, *_ in _INDICES]
-    values += [np.clip(sheet.data[name].values.ravel(), -0.5, 1.5) for _, name, *_ in _INDICES] if intervals else []
+    values += (
+        [np.clip(sheet.data[name].values.ravel(), -0.5, 1.5) for _, name, *_ in _INDICES]
+        if intervals
+        else []
+    )
     every = np.concatenate(values)
     return min(-0.05, 1.05 * float(np.nanmin(every))), max(1.05, 1.05 * float(np.nanmax(every)))

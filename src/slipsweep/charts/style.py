@@ -29,14 +29,22 @@ Floats = NDArray[np.float64]
 Look = dict[str, Any]
 
 #: Attributes of all results that charts show, by name; and of all that an axis can have.
-SHOWN = variables.LIMIT_RESULTS | variables.RECORD_RESULTS | variables.RESULTS | variables.STATISTICS
-_ABOUT = INTENSITY_MEASURES | SHOWN | PARAMETERS | {"displacement": variables.TOLERABLE_DISPLACEMENT}
+SHOWN = (
+    variables.LIMIT_RESULTS | variables.RECORD_RESULTS | variables.RESULTS | variables.STATISTICS
+)
+_ABOUT = (
+    INTENSITY_MEASURES | SHOWN | PARAMETERS | {"displacement": variables.TOLERABLE_DISPLACEMENT}
+)
 
 #: Okabe and Ito's colours: told apart with any kind of colour vision, and in grey.
-BLUE, VERMILION = "#0072B2", "#D55E00"
+BLUE = "#0072B2"
+VERMILION = "#D55E00"
 
-#: Pale to dark in even steps of lightness, read alike with any kind of colour vision; black lines show on all of it.
-COLOURS = LinearSegmentedColormap.from_list("pale", mpl.colormaps["YlGnBu"](np.linspace(0.1, 0.68, 64)))
+#: Pale to dark in even steps of lightness, read alike with any kind of colour vision; black lines
+#: show on all of it.
+COLOURS = LinearSegmentedColormap.from_list(
+    "pale", mpl.colormaps["YlGnBu"](np.linspace(0.1, 0.68, 64))
+)
 
 #: Symbols of the paper.
 SYMBOLS = {
@@ -69,13 +77,17 @@ MODE_TEXT = {
 }
 
 #: Other words of legends.
-NEWMARK, NO_SLIDING = "Newmark's block", MODE_TEXT[SlidingMode.STUCK]
+NEWMARK = "Newmark's block"
+NO_SLIDING = MODE_TEXT[SlidingMode.STUCK]
 UNSOUND = "falls with A, or below\nhalf of Newmark's"
 
 #: How the lines of yield and of the mode limit are drawn.
 LINES: dict[str, tuple[str, Look]] = {
     "yield_line": ("yield", {"color": "black", "linestyle": "-", "linewidth": 1.6}),
-    "limit_line": ("mode limit (Eq. 7)", {"color": "black", "linestyle": (0, (5, 2)), "linewidth": 1.6}),
+    "limit_line": (
+        "mode limit (Eq. 7)",
+        {"color": "black", "linestyle": (0, (5, 2)), "linewidth": 1.6},
+    ),
 }
 
 _UNITS = {"degree": "°", "m s-2": "m/s²", "m s-1": "m/s", "1": ""}
@@ -85,8 +97,9 @@ _UNITS = {"degree": "°", "m s-2": "m/s²", "m s-1": "m/s", "1": ""}
 class Options:
     """What a user chooses about a chart: the parameters of `SlipsweepAccessor.chart`, checked (InputError).
 
-    With `more_panels` panels lie along axes that would have one value otherwise.  `heights` has the levels as numbers
-    in the variable's own unit, in order; `inches` the width of the figure, None for the usual one.
+    With `more_panels` panels lie along axes that would have one value otherwise.  `heights` has the
+    levels as numbers in the variable's own unit, in order; `inches` the width of the figure, None
+    for the usual one.
     """
 
     x: str | None = None
@@ -106,7 +119,10 @@ class Options:
 
     def __post_init__(self) -> None:
         own = "m" if SHOWN.get(self.variable, {}).get("units") == "m" else "1"
-        found = {quantity("levels", one, own, 1.0) if isinstance(one, str) else float(one) for one in self.levels}
+        found = {
+            quantity("levels", one, own, 1.0) if isinstance(one, str) else float(one)
+            for one in self.levels
+        }
         for level in found:
             if not 0 < level < float("inf"):
                 raise InputError(f"levels: {level:g}: must be > 0")
@@ -203,9 +219,13 @@ def flag_name(flag: int) -> str:
 def caption(data: xr.Dataset, options: Options | None = None) -> str:
     """The parameters that have one value, the distributions of uncertain ones, the model and the shaking, in lines."""
     single = [name for name in SYMBOLS if name in data.coords and data[name].size == 1]
-    values = ", ".join(value_text(data, name, data[name].item(), options or Options()) for name in single)
+    values = ", ".join(
+        value_text(data, name, data[name].item(), options or Options()) for name in single
+    )
     drawn = drawn_text(data.attrs)
-    return "\n".join([values, *([f"uncertain: {drawn}"] if drawn else []), model_text(data.attrs)]).strip()
+    return "\n".join(
+        [values, *([f"uncertain: {drawn}"] if drawn else []), model_text(data.attrs)]
+    ).strip()
 
 
 #: Models and their options in captions.
@@ -222,9 +242,16 @@ _WORDS: dict[Any, str] = {
 def model_text(attributes: Mapping[Any, Any]) -> str:
     """What is estimated in a result, its model and its shaking, on two lines."""
     model = MODELS.from_attributes(attributes)
-    words = [_WORDS[model.name], *(_WORDS[value] for value in model.options.values() if value in _WORDS)]
+    words = [
+        _WORDS[model.name],
+        *(_WORDS[value] for value in model.options.values() if value in _WORDS),
+    ]
     recorded = next((name for name in ("record", "suite") if name in attributes), None)
-    shaking = f"{recorded} {plain(attributes[recorded])}" if recorded else WAVEFORMS.from_attributes(attributes)
+    shaking = (
+        f"{recorded} {plain(attributes[recorded])}"
+        if recorded
+        else WAVEFORMS.from_attributes(attributes)
+    )
     if "record_accepted" in attributes:
         shaking = f"{shaking}\naccepted: {plain(attributes['record_accepted'])}"
     inputs = [plain(attributes["friction_inputs"])] if "friction_inputs" in attributes else []
@@ -238,7 +265,9 @@ def drawn_text(attributes: Mapping[Any, Any]) -> str:
     signs = {"absolute": "~", "factor": "×", "offset": "+"}
     texts = []
     for name, given in json.loads(attributes["uncertain"]).items():
-        numbers = ", ".join(f"{key}={value}" for key, value in given.items() if key not in ("distribution", "kind"))
+        numbers = ", ".join(
+            f"{key}={value}" for key, value in given.items() if key not in ("distribution", "kind")
+        )
         texts.append(f"{SYMBOLS[name]} {signs[given['kind']]} {given['distribution']}({numbers})")
     pooled = f"{plain(attributes['pooled'])} x " if "pooled" in attributes else ""
     return f"{', '.join(texts)}; {pooled}{attributes.get('samples', '?')} samples"

@@ -21,7 +21,8 @@ from slipsweep.errors import InputError
 from slipsweep.model.variables import CAUTIONS, INTENSITY_MEASURES, STRENGTHS
 from slipsweep.studies.suite_statistics import SUITE, THRESHOLDS, suite_statistics, without_rounding
 
-#: Powers of the factor and of the time scale that an intensity measure of a motion as recorded grows with.
+#: Powers of the factor and of the time scale that an intensity measure of a motion as recorded
+#: grows with.
 SCALING = {
     "pga": (1, 0),
     "pgv": (1, 1),
@@ -53,12 +54,16 @@ def motions(result: Result, options: Options) -> Figure:
         sheet.data["drawn"] = sheet.data[solved.DISPLACEMENT]
     for panel in sheet.panels:
         floor = log_axis(panel.axes, _millimetres(sheet.data), _LABEL, zeros=True)
-        lines = panel.data["drawn"].transpose(*SUITE, panel.x, missing_dims="ignore").values * 1000.0
+        lines = (
+            panel.data["drawn"].transpose(*SUITE, panel.x, missing_dims="ignore").values * 1000.0
+        )
         draw_suite(sheet, panel.axes, panel.xs, lines, _band(panel.data, panel.x), floor)
         if "newmark_displacement" in panel.data:
             theirs = panel.data.assign({solved.DISPLACEMENT: panel.data["newmark_displacement"]})
             median = np.maximum(_band(theirs, panel.x)[1], floor)
-            sheet.legend[f"median, {style.NEWMARK}"] = panel.axes.plot(panel.xs, median, gid="newmark", **_NEWMARK)[0]
+            sheet.legend[f"median, {style.NEWMARK}"] = panel.axes.plot(
+                panel.xs, median, gid="newmark", **_NEWMARK
+            )[0]
     _note_suite(sheet, "Median and band are of", "they lie below the logarithmic axis")
     sheet.note_left_out(solved.DISPLACEMENT)
     _note_cautions(sheet)
@@ -82,7 +87,8 @@ def intensity(result: Result, options: Options) -> Figure:
         panel.axes.set(xscale="log" if wide else "linear", xlabel=f"{text} ({style.unit(measure)})")
         if wide:
             log_ticks(panel.axes.xaxis, there.max() / there.min())
-        low, negative = panel.axes.get_ylim()[0], polarity < 0
+        low = panel.axes.get_ylim()[0]
+        negative = polarity < 0
         marks: dict[str, tuple[Any, Floats, Look]] = {
             "polarity 1" if negative.any() else "a motion": (~negative & (ys >= low), ys, _POINT),
             "polarity −1": (negative & (ys >= low), ys, _REVERSED),
@@ -93,9 +99,13 @@ def intensity(result: Result, options: Options) -> Figure:
                 own: Look = {"gid": name, "linestyle": "", **look}
                 (sheet.legend[name],) = panel.axes.plot(xs[which], heights[which], **own)
         _draw_regression(sheet, panel, xs, ys)
-    sheet.notes.append("Regression of ln u on the logarithm of the abscissa, of all motions that slide; "
-                       "σ: standard deviation of ln u about it.")  # fmt: skip
-    sheet.notes.append("Abscissa: of the motion as it shakes the block, with its factor and time scale.")
+    sheet.notes.append(
+        "Regression of ln u on the logarithm of the abscissa, of all motions that slide; "
+        "σ: standard deviation of ln u about it."
+    )
+    sheet.notes.append(
+        "Abscissa: of the motion as it shakes the block, with its factor and time scale."
+    )
     if missing := np.count_nonzero(~np.isfinite(places)):
         sheet.notes.append(f"{missing} of {places.size} have no {text}: the samples resolve none.")
     _note_suite(sheet, "Drawn are", "they are marked at the lower edge")
@@ -109,12 +119,16 @@ def histogram(result: Result, options: Options) -> Figure:
     everything = _millimetres(sheet.data)
     slid = everything[everything > 0]
     if not slid.size:
-        raise InputError(f"{result.name}: no motion slides in this slice; choose another slice (--at)")
+        raise InputError(
+            f"{result.name}: no motion slides in this slice; choose another slice (--at)"
+        )
     edges = 10.0 ** np.histogram_bin_edges(np.log10(slid), "sturges")
     # powers of logarithms are rounded: the least and the largest displacement must not lie outside
-    edges[0], edges[-1] = min(edges[0], slid.min()), max(edges[-1], slid.max())
+    edges[0] = min(edges[0], slid.min())
+    edges[-1] = max(edges[-1], slid.max())
     for panel in sheet.panels:
-        values, axes = _millimetres(panel.data), panel.axes
+        values = _millimetres(panel.data)
+        axes = panel.axes
         counts, _ = np.histogram(values[values > 0], edges)
         axes.bar(edges[:-1], counts, np.diff(edges), align="edge", gid="histogram", **_BARS)
         axes.set(xscale="log", xlabel=_LABEL, ylabel="number of motions")
@@ -123,7 +137,11 @@ def histogram(result: Result, options: Options) -> Figure:
         found = suite_statistics(panel.data)
         low, median, high = found["displacement_quantile"].values.ravel() * 1000.0
         edge = "16 and 84 %"
-        for place, look, text in ((median, _MEDIAN, "median"), (low, _EDGE, edge), (high, _EDGE, edge)):
+        for place, look, text in (
+            (median, _MEDIAN, "median"),
+            (low, _EDGE, edge),
+            (high, _EDGE, edge),
+        ):
             if place > 0:
                 sheet.legend[text] = axes.axvline(place, gid=text, **look)
         panel.add_title(f"zero displacement: {found['zero_probability'].item():.0%}")
@@ -144,20 +162,32 @@ def fragility(result: Result, options: Options) -> Figure:
     return statistics.draw_fragility(drawn)
 
 
-def _sheet(result: Result, options: Options, x: str | None = None, more: Sequence[str] = ()) -> Sheet:
+def _sheet(
+    result: Result, options: Options, x: str | None = None, more: Sequence[str] = ()
+) -> Sheet:
     """A slice, along `x`, or along how strong the motions are, else Üy or ky, or any axis."""
-    axes = [dim for dim in (*STRENGTHS, "yield_acceleration", "yield_coefficient", *result.wide) if dim not in SUITE]
-    sheet = result.sheet(options, [*result.compared(solved.DISPLACEMENT), *more], x or axes, keep=SUITE)
-    given, rounded = sheet.data[solved.DISPLACEMENT], without_rounding(sheet.data[solved.DISPLACEMENT])
+    axes = [
+        dim
+        for dim in (*STRENGTHS, "yield_acceleration", "yield_coefficient", *result.wide)
+        if dim not in SUITE
+    ]
+    sheet = result.sheet(
+        options, [*result.compared(solved.DISPLACEMENT), *more], x or axes, keep=SUITE
+    )
+    given = sheet.data[solved.DISPLACEMENT]
+    rounded = without_rounding(sheet.data[solved.DISPLACEMENT])
     sheet.data[solved.DISPLACEMENT] = rounded
     if not rounded.equals(given):
         sheet.notes.append("Displacements below 10⁻¹² m count as zero.")
     return sheet
 
 
-def draw_suite(sheet: Sheet, axes: Axes, xs: Floats, lines: Floats, quantiles: Floats, floor: float = 0.0) -> None:
+def draw_suite(
+    sheet: Sheet, axes: Axes, xs: Floats, lines: Floats, quantiles: Floats, floor: float = 0.0
+) -> None:
     """A thin line for each motion of `lines`, and median and band (16, 50 and 84 %) over them, none below `floor`."""
-    lines, quantiles = np.maximum(lines, floor).reshape(-1, xs.size), np.maximum(quantiles, floor)
+    lines = np.maximum(lines, floor).reshape(-1, xs.size)
+    quantiles = np.maximum(quantiles, floor)
     axes.fill_between(xs, quantiles[0], quantiles[2], gid="band", **_BAND)
     for row in lines:
         plot_curve(axes, xs, row, gid="motion", **_THIN)
@@ -165,7 +195,9 @@ def draw_suite(sheet: Sheet, axes: Axes, xs: Floats, lines: Floats, quantiles: F
         axes.plot(xs, edge, gid="edge", **_EDGE)
     plot_curve(axes, xs, quantiles[1], gid="median", **_MEDIAN)
     sheet.legend["median"] = Line2D([], [], **_MEDIAN)
-    sheet.legend["16 to 84 %"] = Patch(facecolor=_BAND["facecolor"], edgecolor=style.BLUE, linestyle="--")
+    sheet.legend["16 to 84 %"] = Patch(
+        facecolor=_BAND["facecolor"], edgecolor=style.BLUE, linestyle="--"
+    )
     if len(lines):
         sheet.legend["a motion"] = Line2D([], [], **_THIN)
 
@@ -178,7 +210,10 @@ def suite_text(sizes: Mapping[Hashable, int]) -> str:
 
 def _band(data: xr.Dataset, x: str) -> Floats:
     """The suite's quantiles along an axis, mm."""
-    return np.asarray(suite_statistics(data)["displacement_quantile"].transpose("quantile", x)) * 1000.0
+    return (
+        np.asarray(suite_statistics(data)["displacement_quantile"].transpose("quantile", x))
+        * 1000.0
+    )
 
 
 def _millimetres(data: xr.Dataset) -> Floats:
@@ -218,22 +253,38 @@ def _draw_regression(sheet: Sheet, panel: Panel, xs: Floats, ys: Floats) -> None
 def _note_suite(sheet: Sheet, what: str, zeros_are: str = "") -> None:
     """How many motions there are, how many of them have no value, and why; how many displacements are zero."""
     found = suite_statistics(sheet.data)
-    missing, reasons = found["valueless_count"], found["valueless_flag_count"]
-    total, most = int((found["value_count"] + missing).max()), int(missing.max())
+    missing = found["valueless_count"]
+    reasons = found["valueless_flag_count"]
+    total = int((found["value_count"] + missing).max())
+    most = int(missing.max())
     up_to = "" if missing.size == 1 else "up to "
     flags = zip(reasons["flag"].values, reasons.max(missing.dims).values, strict=True)
     why = ", ".join(f"{style.flag_name(int(bit))} {int(n)}" for bit, n in flags if n)
-    left = f"{up_to}{most} of {total} have no value and are left out ({why})" if most else "all have a value"
+    left = (
+        f"{up_to}{most} of {total} have no value and are left out ({why})"
+        if most
+        else "all have a value"
+    )
     sheet.notes.append(f"{what} {suite_text(sheet.data[solved.DISPLACEMENT].sizes)}; {left}.")
     zeros = (found["zero_probability"].fillna(0.0) * found["value_count"]).values
     if zeros_are and zeros.max() > 0:
         count = found["value_count"].values.flat[np.argmax(zeros)]
-        sheet.notes.append(f"Zero displacement: {up_to}{round(zeros.max())} of {count}; {zeros_are}.")
+        sheet.notes.append(
+            f"Zero displacement: {up_to}{round(zeros.max())} of {count}; {zeros_are}."
+        )
 
 
 def _note_cautions(sheet: Sheet) -> None:
     """Which cautions the statistics have in them."""
-    shares = {flag: float(solved.has_flags(sheet.data["validity"], flag).mean()) for flag in CAUTIONS}
-    texts = [f"{style.flag_name(flag)} {solved.percent(share)}" for flag, share in shares.items() if share]
+    shares = {
+        flag: float(solved.has_flags(sheet.data["validity"], flag).mean()) for flag in CAUTIONS
+    }
+    texts = [
+        f"{style.flag_name(flag)} {solved.percent(share)}"
+        for flag, share in shares.items()
+        if share
+    ]
     if texts:
-        sheet.notes.append(f"Statistics are of all values, also those with a caution: {', '.join(texts)}.")
+        sheet.notes.append(
+            f"Statistics are of all values, also those with a caution: {', '.join(texts)}."
+        )

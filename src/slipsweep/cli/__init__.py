@@ -1,7 +1,8 @@
 """The command line: one file a command, or a few of one kind, put together and run here.
 
-Exit status 0: done; 1: the run failed; 2: a bad command or sweep file; 130: Ctrl-C.  What a user can mend is said in
-one line, never a traceback.  What a command needs is imported inside it, so that `slipsweep --help` is there at once.
+Exit status 0: done; 1: the run failed; 2: a bad command or sweep file; 130: Ctrl-C.  What a user
+can mend is said in one line, never a traceback.  What a command needs is imported inside it, so
+that `slipsweep --help` is there at once.
 """
 
 import os
@@ -37,7 +38,9 @@ class _Commands(TyperGroup):
         except (InputError, RunError, OSError, MemoryError) as error:
             is_input = isinstance(error, InputError)
             # notes of bad input are of the files of a suite, say: one each
-            lines = ("\n  " if is_input else "; ").join((_message(error), *getattr(error, "__notes__", ())))
+            lines = ("\n  " if is_input else "; ").join(
+                (_message(error), *getattr(error, "__notes__", ()))
+            )
             echo(f"slipsweep: error: {lines}", err=True)
             raise typer.Exit(2 if is_input else 1) from None
 
@@ -59,7 +62,10 @@ def _show_version(requested: bool) -> None:
 @app.callback(cls=_Commands)
 def _options(
     version: Annotated[
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
+        bool,
+        typer.Option(
+            "--version", callback=_show_version, is_eager=True, help="Show the version and exit."
+        ),
     ] = False,
 ) -> None:
     """Permanent displacement of a rigid block on a shaken inclined base, over grids of parameters."""
@@ -67,7 +73,9 @@ def _options(
 
 #: Modules of the commands, in the order of the help.
 _MODULES = [one.__name__ for one in (run, simulate, limit, hazard, chart, info, calibrate)]
-app.registered_commands.sort(key=lambda one: _MODULES.index(one.callback.__module__ if one.callback else ""))
+app.registered_commands.sort(
+    key=lambda one: _MODULES.index(one.callback.__module__ if one.callback else "")
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -81,7 +89,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")  # an alphabet without λ fails no command
     try:
-        app(list(sys.argv[1:] if arguments is None else arguments) or ["--help"], prog_name="slipsweep")
+        app(
+            list(sys.argv[1:] if arguments is None else arguments) or ["--help"],
+            prog_name="slipsweep",
+        )
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else 0
     return 0

@@ -53,8 +53,12 @@ class Measured:
     theta: Annotated[str, options.THETA]
     mu_s: options.MuS = None
     phi: options.Phi = None
-    offset: Annotated[Texts, TEST("Channel with an offset, or all; may be repeated.", "CHANNEL")] = None
-    drift: Annotated[Texts, TEST("Channel that drifts linearly, or all; may be repeated.", "CHANNEL")] = None
+    offset: Annotated[
+        Texts, TEST("Channel with an offset, or all; may be repeated.", "CHANNEL")
+    ] = None
+    drift: Annotated[
+        Texts, TEST("Channel that drifts linearly, or all; may be repeated.", "CHANNEL")
+    ] = None
 
     def given(self, g: float) -> dict[str, Any]:
         """The same as Python's functions take it."""
@@ -73,11 +77,15 @@ def friction(
     test: Annotated[Path, options.read("TEST.csv", _COLUMNS)],
     measured: Measured,
     g: Annotated[float, options.BLOCK("Gravity, m/s².")] = 9.81,
-    rest: Annotated[tuple[float, float] | None, TEST("Times of rest, s, to find both by.", "FROM TO")] = None,
+    rest: Annotated[
+        tuple[float, float] | None, TEST("Times of rest, s, to find both by.", "FROM TO")
+    ] = None,
     threshold: Annotated[
         Text, TEST("Relative acceleration of a slide: 0.02g (default: 4 times its noise).", "VALUE")
     ] = None,
-    output: Annotated[options.Paths, written("Write .nc, .png, .svg or .pdf; may be repeated.")] = None,
+    output: Annotated[
+        options.Paths, written("Write .nc, .png, .svg or .pdf; may be repeated.")
+    ] = None,
     overwrite: options.Overwrite = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -91,10 +99,16 @@ def friction(
     common.write_outputs(paths, overwrite, table)
     if quiet:
         return
-    attrs, slides = table.attrs, table[[*_SLIDES]].to_dataframe()[[*_SLIDES]].rename(columns=_SLIDES)
+    attrs = table.attrs
+    slides = table[[*_SLIDES]].to_dataframe()[[*_SLIDES]].rename(columns=_SLIDES)
     threshold = f"threshold  {attrs['threshold']:.4g} m/s2: {attrs['threshold_from']}"
     _echo_coefficients(table, threshold, f"removed    {attrs['removed']}")
-    echo(f"{len(slides)} slides, s and m/s2:\n{_text(slides, index=False)}" if len(slides) else "0 slides", *paths)
+    echo(
+        f"{len(slides)} slides, s and m/s2:\n{_text(slides, index=False)}"
+        if len(slides)
+        else "0 slides",
+        *paths,
+    )
 
 
 @command(
@@ -104,17 +118,23 @@ def friction(
 )
 def calibrate(
     *,
-    tests: Annotated[list[Path], options.read("TEST.csv...", f"{_COLUMNS} One at least of the block's.")],
+    tests: Annotated[
+        list[Path], options.read("TEST.csv...", f"{_COLUMNS} One at least of the block's.")
+    ],
     measured: Measured,
     cycles: Annotated[bool, TEST("Fit each cycle separately, too.")] = True,
-    output: Annotated[options.Paths, written("Write .nc, .toml, .png, .svg or .pdf; may be repeated.")] = None,
+    output: Annotated[
+        options.Paths, written("Write .nc, .toml, .png, .svg or .pdf; may be repeated.")
+    ] = None,
     overwrite: options.Overwrite = False,
     model: Annotated[Model, MODELS],
     quiet: options.Quiet = False,
 ) -> None:
     """Estimate yield acceleration, λ and Δμ from one or several tests."""
     given = measured.given(model.g)
-    paths = outputs.check_outputs(output, overwrite, reads=tests, endings=(".nc", ".toml", *FIGURES))
+    paths = outputs.check_outputs(
+        output, overwrite, reads=tests, endings=(".nc", ".toml", *FIGURES)
+    )
     from slipsweep.studies import calibration
 
     table = calibration.calibrate(tests, **given, model=model, cycles=cycles)
@@ -127,10 +147,23 @@ def calibrate(
     _echo_parameters(table)
     echo(f"removed: {table.attrs['removed']}")
     for number in range(table.sizes.get("test", 1)) if "cycle_start" in table else ():
-        fitted = table.isel(test=number, missing_dims="ignore")[[*_CYCLES]].to_dataframe().reset_index()
-        echo(_text(fitted[[*_CYCLES]].dropna(subset=["cycle_start"]).rename(columns=_CYCLES), index=False))
+        fitted = (
+            table.isel(test=number, missing_dims="ignore")[[*_CYCLES]].to_dataframe().reset_index()
+        )
+        echo(
+            _text(
+                fitted[[*_CYCLES]].dropna(subset=["cycle_start"]).rename(columns=_CYCLES),
+                index=False,
+            )
+        )
     constant = table.attrs["constant_friction"]
-    echo(*(f"note: {finding}" for finding in table.attrs["findings"].splitlines() if finding != constant))
+    echo(
+        *(
+            f"note: {finding}"
+            for finding in table.attrs["findings"].splitlines()
+            if finding != constant
+        )
+    )
     echo("", text, *paths)
 
 
@@ -152,15 +185,26 @@ def _echo_parameters(table: "xr.Dataset") -> None:
     from slipsweep.studies.likelihood import SOUGHT
 
     # no value where the data do not determine one
-    rows = [[table[one].where(table[f"{one}_error"] < math.inf), *table[f"{one}_interval"]] for one in SOUGHT]
+    rows = [
+        [table[one].where(table[f"{one}_error"] < math.inf), *table[f"{one}_interval"]]
+        for one in SOUGHT
+    ]
     labels = [f"{one} ({table[one].attrs['units']})" for one in SOUGHT]
     found = pd.DataFrame(rows, labels, ["value", "95 % from", "to"], dtype=float)
-    echo(_text(found), "correlation", _text(pd.DataFrame(table["correlation"].values, [*SOUGHT], [*SOUGHT])))
+    echo(
+        _text(found),
+        "correlation",
+        _text(pd.DataFrame(table["correlation"].values, [*SOUGHT], [*SOUGHT])),
+    )
     echo("misfit, root mean square, and in parts of the largest value")
     for name in (one for one in RESPONSES if f"misfit_{one}" in table):
         misfits, shares = (table[f"{kind}misfit_{name}"] for kind in ("", "relative_"))
-        units, pairs = misfits.attrs["units"], zip(misfits.values.flat, shares.values.flat, strict=True)
-        parts = (f"{one:.2g} {units}  {share:.1%}" if one == one else "not measured" for one, share in pairs)
+        units = misfits.attrs["units"]
+        pairs = zip(misfits.values.flat, shares.values.flat, strict=True)
+        parts = (
+            f"{one:.2g} {units}  {share:.1%}" if one == one else "not measured"
+            for one, share in pairs
+        )
         echo(f"  {name:<24}{', '.join(parts)}")
 
 

@@ -9,7 +9,9 @@ from slipsweep.cli.options import OUTPUT, File, Text, Texts, command, written
 from slipsweep.errors import InputError
 from slipsweep.files import outputs
 
-CHART, AXES, LOOK = options.Panel("Chart"), options.Panel("Axes"), options.Panel("Look")
+CHART = options.Panel("Chart")
+AXES = options.Panel("Axes")
+LOOK = options.Panel("Look")
 
 _KINDS = (
     "contours, modes, families, curve, dimensionless, newmark or spread; of uncertain inputs fragility, quantiles or "
@@ -18,17 +20,30 @@ _KINDS = (
 )
 
 
-@command("Draw", "slipsweep chart design_chart.nc --kind contours --at theta=5 --at mu_s=0.4 -o chart.pdf")
+@command(
+    "Draw",
+    "slipsweep chart design_chart.nc --kind contours --at theta=5 --at mu_s=0.4 -o chart.pdf",
+)
 def chart(
     file: options.Swept,
     kind: Annotated[Texts, CHART(_KINDS, "KIND", "--kind", "-k")] = None,
     at: Annotated[
-        Texts, CHART("Value of another axis, by default the middle; several select curves: theta=8,11.", "NAME=VALUE")
+        Texts,
+        CHART(
+            "Value of another axis, by default the middle; several select curves: theta=8,11.",
+            "NAME=VALUE",
+        ),
     ] = None,
-    x: Annotated[Text, AXES("Axis to draw over; of intensity the measure: pgv, cav.", "NAME")] = None,
+    x: Annotated[
+        Text, AXES("Axis to draw over; of intensity the measure: pgv, cav.", "NAME")
+    ] = None,
     y: Annotated[Text, AXES("Vertical axis of a map, or the curve parameter.", "NAME")] = None,
-    panels: Annotated[Text, AXES("One or two axes of panels, across and down.", "NAME[,NAME]")] = None,
-    variable: Annotated[str, CHART("What contours and families show.", "NAME")] = "permanent_displacement",
+    panels: Annotated[
+        Text, AXES("One or two axes of panels, across and down.", "NAME[,NAME]")
+    ] = None,
+    variable: Annotated[
+        str, CHART("What contours and families show.", "NAME")
+    ] = "permanent_displacement",
     levels: Annotated[
         Text, LOOK("Contours, or displacements of a suite's fragility: 1cm,5cm,30cm.", "LEVEL,...")
     ] = None,
@@ -40,7 +55,9 @@ def chart(
     grey: Annotated[bool, LOOK("Draw without colour.", None, "--grey")] = False,
     output: Annotated[
         options.Paths,
-        written("Write .png, .svg or .pdf; may be repeated (default: OUT-KIND.png). Several charts go to one .pdf."),
+        written(
+            "Write .png, .svg or .pdf; may be repeated (default: OUT-KIND.png). Several charts go to one .pdf."
+        ),
     ] = None,
     overwrite: options.Overwrite = False,
 ) -> None:
@@ -57,14 +74,19 @@ def chart(
     across, heights = (text.split(",") if text else () for text in (panels, levels))
     typed = options.cuts(at)
     with opening.read_result(file) as data:
-        result, axes = slices.Result(data, file), selection.own_names(data, typed)
-        look = style.Options(x, y, axes, across, variable, heights, units, show_cautions, width, grey)
+        result = slices.Result(data, file)
+        axes = selection.own_names(data, typed)
+        look = style.Options(
+            x, y, axes, across, variable, heights, units, show_cautions, width, grey
+        )
         result.places(look.at)
         chosen = requested or kinds.fitting(result, look)
         look.more_panels = together = bool(given) and len(chosen) > 1
         for path in given:
             if together and path.suffix != ".pdf":
-                raise InputError(f"{path}: is for one chart: give one --kind, or a name that ends in .pdf for several")
+                raise InputError(
+                    f"{path}: is for one chart: give one --kind, or a name that ends in .pdf for several"
+                )
         default = {name: Path(f"{file.stem}-{name}.png") for name in chosen}
         outputs.check_outputs(given or [*default.values()], overwrite, reads=[file])
         figures, left_out = kinds.draw_all(result, chosen, look, strict=bool(requested))
@@ -79,7 +101,11 @@ def chart(
     echo(*(f"no {name}: {reason}" for name, reason in left_out.items()))
 
 
-@command("Draw", "slipsweep report design_chart.nc", "slipsweep report design_chart.nc -o charts.pdf --overwrite")
+@command(
+    "Draw",
+    "slipsweep report design_chart.nc",
+    "slipsweep report design_chart.nc -o charts.pdf --overwrite",
+)
 def report(
     file: options.Swept,
     output: Annotated[File, written("PDF to write (default: OUT.pdf).", "OUT.pdf")] = None,
@@ -94,9 +120,13 @@ def report(
 @command("Draw", "slipsweep explore design_chart.nc -o design_chart.html")
 def explore(
     file: Annotated[Path, options.read("OUT.nc", "A file that slipsweep run wrote.")],
-    output: Annotated[File, written("Page to write (default: the file's name, .html).", "PAGE.html")] = None,
+    output: Annotated[
+        File, written("Page to write (default: the file's name, .html).", "PAGE.html")
+    ] = None,
     overwrite: options.Overwrite = False,
-    size: Annotated[str, OUTPUT("Largest size of the page; larger results are thinned to it.", "SIZE")] = "10MB",
+    size: Annotated[
+        str, OUTPUT("Largest size of the page; larger results are thinned to it.", "SIZE")
+    ] = "10MB",
     quiet: options.Quiet = False,
 ) -> None:
     """Write a page for the browser in which to explore a result."""

@@ -43,8 +43,11 @@ def write_outputs(
             if text := texts.get(path.suffix[1:]):
                 temporary.write_text(text(), encoding="utf-8")
             elif path.suffix == ".nc":
-                plain, title = netcdf.without_time_axis(table), table.attrs["title"]
-                found = netcdf.described(plain, title=title, command=typed_command(), recorded=recorded)
+                plain = netcdf.without_time_axis(table)
+                title = table.attrs["title"]
+                found = netcdf.described(
+                    plain, title=title, command=typed_command(), recorded=recorded
+                )
                 netcdf.write_table(found, temporary)
             else:
                 from slipsweep.charts import kinds
@@ -59,7 +62,9 @@ def run_job(job: "Job", path: "Place", large: Large, unit: str = "cells") -> "Re
     from slipsweep.grid.resources import parse_size
 
     if large.resume and large.overwrite:
-        raise InputError("--resume, --overwrite: the first continues an interrupted run, the second starts it again")
+        raise InputError(
+            "--resume, --overwrite: the first continues an interrupted run, the second starts it again"
+        )
     given = {name: value for name, value in vars(large).items() if name != "quiet"}
     given["memory"] = None if large.memory is None else parse_size("--memory", large.memory)
     with progress_bar(job.plan.cells, large.quiet, unit) as progress:
@@ -75,25 +80,43 @@ def typed_command() -> str:
 
 
 @contextmanager
-def progress_bar(cells: int, quiet: bool, unit: str = "cells") -> Iterator[Callable[[int], None] | None]:
+def progress_bar(
+    cells: int, quiet: bool, unit: str = "cells"
+) -> Iterator[Callable[[int], None] | None]:
     """Yield what to call with a number of cells done: a progress bar, if there is a terminal to see it."""
     if quiet or sys.stderr is None or not sys.stderr.isatty():
         yield None
         return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeRemainingColumn,
+    )
 
     from slipsweep.jit import compiling
 
-    columns = (BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), TextColumn("{task.description}"))
+    columns = (
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.description}"),
+    )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task, before = bar.add_task("", total=cells), compiling.seconds
-        compiling.announce = lambda kernel: bar.update(task, description=f"compiling {kernel}, once")
+        task = bar.add_task("", total=cells)
+        before = compiling.seconds
+        compiling.announce = lambda kernel: bar.update(
+            task, description=f"compiling {kernel}, once"
+        )
 
         def advance(more: int) -> None:
             bar.advance(task, more)
             solving = (bar.tasks[task].elapsed or 0.0) - (compiling.seconds - before)
-            bar.update(task, description=f"{bar.tasks[task].completed / max(solving, 1e-9):.3g} {unit}/s")
+            bar.update(
+                task, description=f"{bar.tasks[task].completed / max(solving, 1e-9):.3g} {unit}/s"
+            )
 
         yield advance
 
@@ -101,7 +124,9 @@ def progress_bar(cells: int, quiet: bool, unit: str = "cells") -> Iterator[Calla
 def echo(*texts: object, err: bool = False) -> None:
     """Print lines; text that comes from a file sends no control sequences to the terminal."""
     for text in map(str, texts):
-        shown = (c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
+        shown = (
+            c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text
+        )
         typer.echo("".join(shown), err=err)
 
 
@@ -116,7 +141,12 @@ def echo_tally(tally: "Tally") -> None:
     """Print the shares of sliding modes and of the flags that cells have, and what moves the displacement."""
     if tally.modes is not None:
         echo("sliding modes:")
-        echo(*(f"  {mode.name.lower():<24}{tally.share(count):7.2%}" for mode, count in tally.modes.items()))
+        echo(
+            *(
+                f"  {mode.name.lower():<24}{tally.share(count):7.2%}"
+                for mode, count in tally.modes.items()
+            )
+        )
     if tally.flags is not None:
         seen = variables.Validity(sum(flag for flag, count in tally.flags.items() if count))
         echo("flags (validity):" if seen else "flags (validity): none")
@@ -124,18 +154,29 @@ def echo_tally(tally: "Tally") -> None:
             flags = seen & variables.flags_of(kind)
             echo(*([f"  {kind}: {variables.FLAG_KIND_TEXT[kind]}"] if flags else ()))
             for flag in flags:
-                echo(f"    {(flag.name or '').lower():<22}{tally.share(tally.flags[flag]):7.2%}  {flag.text}")
+                echo(
+                    f"    {(flag.name or '').lower():<22}{tally.share(tally.flags[flag]):7.2%}  {flag.text}"
+                )
     if tally.ratios is not None and tally.ratios.number:
         low, median, high = (f"{tally.ratios.quantile(share):.3g}" for share in (0.05, 0.5, 0.95))
-        echo(f"displacement over Newmark's, where both slide: median {median}, 5 to 95 % {low} to {high}")
+        echo(
+            f"displacement over Newmark's, where both slide: median {median}, 5 to 95 % {low} to {high}"
+        )
     if (indices := tally.indices) is None:
         return
     import pandas as pd
 
-    points, there = sum(indices.status.values()), indices.status[variables.SensitivityStatus.COMPUTED]
-    echo(f"Sobol indices of the permanent displacement, at {there} of {points} grid points, and their means:")
+    points = sum(indices.status.values())
+    there = indices.status[variables.SensitivityStatus.COMPUTED]
+    echo(
+        f"Sobol indices of the permanent displacement, at {there} of {points} grid points, and their means:"
+    )
     if there:
-        columns = {"first order": indices.first, "total": indices.total, "largest total at": indices.largest}
+        columns = {
+            "first order": indices.first,
+            "total": indices.total,
+            "largest total at": indices.largest,
+        }
         rows = pd.DataFrame(columns).sort_values("total", ascending=False)
         echo(rows.to_string(float_format="{:.3f}".format))
     for status, count in indices.status.items():
@@ -145,7 +186,9 @@ def echo_tally(tally: "Tally") -> None:
 
 def echo_suite(table: "xr.Dataset", most: int, typed: Sequence[str] | None = None) -> None:
     """Print the statistics of a suite or of samples, at each of `most` grid points, with P(u > d) of those typed."""
-    stored = {"permanent_displacement", "validity"} <= {*table.data_vars} and "limit_amplitude" not in table
+    stored = {"permanent_displacement", "validity"} <= {
+        *table.data_vars
+    } and "limit_amplitude" not in table
     sampled = "displacement_quantile" in table and (typed or "suite" in table.attrs)
     if sampled or (stored and table["permanent_displacement"].sizes.get("motion", 1) > 1):
         from slipsweep.studies.suite_statistics import summary_lines

@@ -18,32 +18,54 @@ _MUCH = 0.05
 HAZARD = options.Panel("Hazard")
 
 
-@command("Compute", "slipsweep hazard suite.nc --curve hazard.csv -d 50mm -d 30cm -o hazard.png -o fragility.xml")
+@command(
+    "Compute",
+    "slipsweep hazard suite.nc --curve hazard.csv -d 50mm -d 30cm -o hazard.png -o fragility.xml",
+)
 def hazard(
-    file: Annotated[Path, options.read("OUT.nc", "A result under a suite or [uncertainty], with an axis amplitude.")],
+    file: Annotated[
+        Path,
+        options.read("OUT.nc", "A result under a suite or [uncertainty], with an axis amplitude."),
+    ],
     curve: Annotated[
-        Path, HAZARD('Columns "PGA (g)" and "annual rate", from low to high; or OpenQuake\'s.', "HAZARD.csv")
+        Path,
+        HAZARD(
+            'Columns "PGA (g)" and "annual rate", from low to high; or OpenQuake\'s.', "HAZARD.csv"
+        ),
     ],
     displacement: Annotated[list[str], options.LENGTH],
-    site: Annotated[int | None, HAZARD("Which site of an OpenQuake file with several, from 1.", "N")] = None,
+    site: Annotated[
+        int | None, HAZARD("Which site of an OpenQuake file with several, from 1.", "N")
+    ] = None,
     at: options.At = None,
     output: Annotated[
-        options.Paths, written("Write .png, .svg or .pdf, or the fragility as .xml of OpenQuake; may be repeated.")
+        options.Paths,
+        written(
+            "Write .png, .svg or .pdf, or the fragility as .xml of OpenQuake; may be repeated."
+        ),
     ] = None,
     overwrite: options.Overwrite = False,
     quiet: options.Quiet = False,
 ) -> None:
     """Compute the mean annual rate of exceeding a displacement.
 
-    From a hazard curve and the fragility under a suite of recorded motions, under uncertain inputs, or under both.
+    From a hazard curve and the fragility under a suite of recorded motions, under uncertain inputs,
+    or under both.
     """
     import xarray as xr
 
     from slipsweep.files.opening import read_result, values_text
     from slipsweep.files.selection import own_names, selected
-    from slipsweep.studies.hazard import displacement_hazard, fragility, openquake_fragility, read_hazard_curve
+    from slipsweep.studies.hazard import (
+        displacement_hazard,
+        fragility,
+        openquake_fragility,
+        read_hazard_curve,
+    )
 
-    paths = outputs.check_outputs(output, overwrite, reads=[file, curve], endings=(*FIGURES, ".xml"))
+    paths = outputs.check_outputs(
+        output, overwrite, reads=[file, curve], endings=(*FIGURES, ".xml")
+    )
     whole = read_result(file)
     table = whole[[name for name in _NEEDED if name in whole]].load()
     if "g" not in table.attrs:
@@ -53,7 +75,8 @@ def hazard(
     for name in typed:
         if chosen.sizes.get(name, 1) > 1:
             raise InputError(f"{file}: --at {name}: {chosen.sizes[name]} values; must be one")
-    result, g = chosen.squeeze([name for name in typed if name in chosen.sizes]), float(table.attrs["g"])
+    result = chosen.squeeze([name for name in typed if name in chosen.sizes])
+    g = float(table.attrs["g"])
     lengths = options.displacements(displacement, g)
     given = read_hazard_curve(curve, g, site)
     rates = displacement_hazard(result, given, lengths)
@@ -64,33 +87,46 @@ def hazard(
         marked = rates["threshold"].values
         more = None if "exceedance_probability" in result else drawn_thresholds(result, marked)
         drawn = displacement_hazard(result, given, more).assign_attrs(marked=marked)
-    common.write_outputs(paths, overwrite, drawn, xml=lambda: openquake_fragility(fragility(result, lengths)))
+    common.write_outputs(
+        paths, overwrite, drawn, xml=lambda: openquake_fragility(fragility(result, lengths))
+    )
     if quiet:
         return
     low, high = (float(one) / g for one in rates.attrs["amplitude_range"])
     start, end = (float(one) / g for one in rates.attrs["hazard_curve_range"])
     # P is known between these, and the rate of what lies above and below is not
-    first, last = max(low, start), min(high, end)
+    first = max(low, start)
+    last = min(high, end)
     echo(f"P(u > d | PGA): share over {rates.attrs['suite_dimensions'].replace(' ', ' and ')}")
-    echo(f"amplitudes of the result {low:.4g} to {high:.4g} g, hazard curve {start:.4g} to {end:.4g} g")
-    values = {name: rates[name] for name in typed if name in rates.coords and name not in rates.sizes}
+    echo(
+        f"amplitudes of the result {low:.4g} to {high:.4g} g, hazard curve {start:.4g} to {end:.4g} g"
+    )
+    values = {
+        name: rates[name] for name in typed if name in rates.coords and name not in rates.sizes
+    }
     echo(*(f"{name} = {values_text(value)}" for name, value in values.items()))
     rate, held, omitted = (rates[name] for name in ("annual_rate", "held_rate", "omitted_rate"))
     axis = "the axis amplitude of the sweep" if high < end else "the hazard curve"
-    missing, what = rates["valueless_share"], "samples" if "samples" in rates.attrs["suite_dimensions"] else "motions"
-    unstable = "; those that are statically unstable count as exceeding" if what == "samples" else ""
+    missing = rates["valueless_share"]
+    what = "samples" if "samples" in rates.attrs["suite_dimensions"] else "motions"
+    unstable = (
+        "; those that are statically unstable count as exceeding" if what == "samples" else ""
+    )
     notes = {
         f"up to {missing.max():.1%} of the {what} have no value at an amplitude: left out of P{unstable}": missing
         > 0.0,
         "without an annual rate: fewer than two amplitudes have a value": rate.isnull(),
-        "annual rate 0: the displacement is not exceeded at any amplitude of the result": rate == 0.0,
-        f"above {last:.4g} g P(u > d) is taken as it is there: to compute it, extend {axis}": held > _MUCH * rate,
+        "annual rate 0: the displacement is not exceeded at any amplitude of the result": rate
+        == 0.0,
+        f"above {last:.4g} g P(u > d) is taken as it is there: to compute it, extend {axis}": held
+        > _MUCH * rate,
         f"below {first:.4g} g nothing is counted: to compute it, begin the axis amplitude lower": omitted
         > _MUCH * rate,
         f"the hazard curve begins at {start:.4g} g, where displacements are exceeded already: the rates are too small "
         "by an unknown part; begin the curve lower": omitted.isnull() & rate.notnull(),
         "P(u > d) grows much from one amplitude to the next: the rates may be wrong by the factors above; put more "
-        "values on the axis amplitude": (rates["upper_rate"] > 2.0 * rates["lower_rate"]) & (held < rate),
+        "values on the axis amplitude": (rates["upper_rate"] > 2.0 * rates["lower_rate"])
+        & (held < rate),
     }
     exceeded = rate.where(rate > 0.0)
     columns = {

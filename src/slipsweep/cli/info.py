@@ -14,8 +14,16 @@ from slipsweep.grid.resources import size_text
 TABLE = options.Panel("Table")
 
 
-@options.command("Read results", "slipsweep info design_chart.nc", "slipsweep info suite.nc -d 50mm --at mu_s=0.4")
-def info(file: options.Result, displacement: Annotated[Texts, options.LENGTH] = None, at: options.At = None) -> None:
+@options.command(
+    "Read results",
+    "slipsweep info design_chart.nc",
+    "slipsweep info suite.nc -d 50mm --at mu_s=0.4",
+)
+def info(
+    file: options.Result,
+    displacement: Annotated[Texts, options.LENGTH] = None,
+    at: options.At = None,
+) -> None:
     """Show what a result holds, how it was made, its shares of flags, and the statistics of a suite."""
     from slipsweep.files import jobs, motions, opening, selection, storing
     from slipsweep.grid.tally import tally_of
@@ -23,8 +31,14 @@ def info(file: options.Result, displacement: Annotated[Texts, options.LENGTH] = 
 
     table = opening.read_result(file)
     echo(f"{Path(file)}  {size_text(storing.nbytes_of(opening.place_of(file)))}")
-    echo("coordinates:", *(f"  {name:<23} {text}" for name, text in opening.coordinate_texts(table).items()))
-    echo("variables:", *(f"  {name:<23} {text}" for name, text in opening.variable_texts(table).items()))
+    echo(
+        "coordinates:",
+        *(f"  {name:<23} {text}" for name, text in opening.coordinate_texts(table).items()),
+    )
+    echo(
+        "variables:",
+        *(f"  {name:<23} {text}" for name, text in opening.variable_texts(table).items()),
+    )
     recorded = motions.read_embedded(table, Path(file))
     if isinstance(recorded, Record):
         echo(f"record: {recorded.summary()}")
@@ -35,13 +49,19 @@ def info(file: options.Result, displacement: Annotated[Texts, options.LENGTH] = 
     except InputError as error:
         echo(f"modes and flags not counted: {error}")
     if displacement and table.sizes.get("motion", 1) < 2 and "displacement_quantile" not in table:
-        raise InputError(f"{file}: --displacement: is for results of a suite of motions, or of uncertain inputs")
+        raise InputError(
+            f"{file}: --displacement: is for results of a suite of motions, or of uncertain inputs"
+        )
     chosen = selection.selected(table, file, options.cuts(at), ("motion", "quantile", "threshold"))
     common.echo_suite(chosen, most=100, typed=displacement)
     for name, value in table.attrs.items():
         lines = str(value).splitlines()
         if name != jobs.RUN:
-            echo(f"{name}: {lines[0]}".rstrip() if len(lines) == 1 else "\n  ".join((f"{name}:", *lines)))
+            echo(
+                f"{name}: {lines[0]}".rstrip()
+                if len(lines) == 1
+                else "\n  ".join((f"{name}:", *lines))
+            )
 
 
 @options.command(
@@ -56,17 +76,24 @@ def export(
     variables: Annotated[
         Texts, TABLE("Result to export (default: all); may be repeated.", "NAME", "--variable")
     ] = None,
-    words: Annotated[bool, TABLE("Sliding modes and flags as words, not codes.", None, "--words")] = False,
+    words: Annotated[
+        bool, TABLE("Sliding modes and flags as words, not codes.", None, "--words")
+    ] = False,
     in_g: Annotated[bool, TABLE("Accelerations in g, not in m/s².", None, "--in-g")] = False,
     at: options.At = None,
-    rows: Annotated[Text, TABLE("With --columns: axes of the rows (default: all others).", "NAME[,NAME]")] = None,
-    columns: Annotated[Text, TABLE("Axis whose values become columns; one table per result.", "NAME")] = None,
+    rows: Annotated[
+        Text, TABLE("With --columns: axes of the rows (default: all others).", "NAME[,NAME]")
+    ] = None,
+    columns: Annotated[
+        Text, TABLE("Axis whose values become columns; one table per result.", "NAME")
+    ] = None,
     overwrite: options.Overwrite = False,
     quiet: options.Quiet = False,
 ) -> None:
     """Write a result as a table: CSV, Parquet or .xlsx; or the fragility of a suite or of samples for OpenQuake (.xml).
 
-    One row per case, coordinates as columns, units in the header; with --columns a table of one result over two axes.
+    One row per case, coordinates as columns, units in the header; with --columns a table of one
+    result over two axes.
     """
     from slipsweep.files import export as tables
     from slipsweep.files import opening, selection
@@ -76,8 +103,12 @@ def export(
 
         paths = outputs.check_outputs([output], overwrite, reads=[Path(file)], endings=(".xml",))
         # P(u > d) along the axis amplitude, of the values that --at takes of others
-        chosen = selection.selected(opening.read_result(file), file, options.cuts(at), ("motion", "quantile"))
-        common.write_outputs(paths, overwrite, chosen, xml=lambda: openquake_fragility(fragility(chosen)))
+        chosen = selection.selected(
+            opening.read_result(file), file, options.cuts(at), ("motion", "quantile")
+        )
+        common.write_outputs(
+            paths, overwrite, chosen, xml=lambda: openquake_fragility(fragility(chosen))
+        )
         echo(*([] if quiet else paths))
         return
     count = tables.export(

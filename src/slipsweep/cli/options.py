@@ -17,11 +17,14 @@ from slipsweep.model.parameters import check_values
 from slipsweep.model.units import quantity
 from slipsweep.model.variables import PARAMETERS
 
-#: The largest displacement that a number without a unit is taken for, m: more is likely to be meant in millimetres.
+#: The largest displacement that a number without a unit is taken for, m: more is likely to be meant
+#: in millimetres.
 _MOST_WITHOUT_UNIT = 2.0
 
 #: The program, to which each command adds itself.
-app = typer.Typer(context_settings={"help_option_names": ["-h", "--help"]}, pretty_exceptions_enable=False)
+app = typer.Typer(
+    context_settings={"help_option_names": ["-h", "--help"]}, pretty_exceptions_enable=False
+)
 
 
 class Panel(str):
@@ -29,10 +32,15 @@ class Panel(str):
 
     def __call__(self, about: str, metavar: str | None = None, *names: str, **more: Any) -> Any:
         """An option of the group; names where its parameter does not give it, and what else typer takes."""
-        return typer.Option(*names, help=about.replace("[", r"\["), metavar=metavar, rich_help_panel=self, **more)
+        return typer.Option(
+            *names, help=about.replace("[", r"\["), metavar=metavar, rich_help_panel=self, **more
+        )
 
 
-SHAKING, BLOCK, OUTPUT, LARGE = Panel("Shaking"), Panel("Block"), Panel("Output"), Panel("Large runs")
+SHAKING = Panel("Shaking")
+BLOCK = Panel("Block")
+OUTPUT = Panel("Output")
+LARGE = Panel("Large runs")
 RARE = Panel("Rare options")  # that few cases need
 
 
@@ -61,9 +69,14 @@ Result = Annotated[str, read("OUT.nc|OUT.zarr", "A file that slipsweep wrote.")]
 
 #: What ``-d`` declares.
 LENGTH = Panel("Displacement")(
-    "Tolerable, or to be exceeded: 50mm, 0.05 (m); may be repeated.", "LENGTH", "--displacement", "-d"
+    "Tolerable, or to be exceeded: 50mm, 0.05 (m); may be repeated.",
+    "LENGTH",
+    "--displacement",
+    "-d",
 )
-_AT = "Values of an axis: theta=12, amplitude=0.1g,0.2g, case=LABEL (default: all); may be repeated."
+_AT = (
+    "Values of an axis: theta=12, amplitude=0.1g,0.2g, case=LABEL (default: all); may be repeated."
+)
 At = Annotated[Texts, Panel("Selection")(_AT, "NAME=VALUE")]
 
 
@@ -73,10 +86,18 @@ class Large:
 
     overwrite: Overwrite = False
     quiet: Quiet = False
-    resume: Annotated[bool, LARGE("Continue an interrupted run from its finished chunks.", None, "--resume")] = False
-    memory: Annotated[Text, LARGE("Memory limit: 512MiB, 2GB (default: 500 to 600 MB).", "SIZE")] = None
-    workers: Annotated[int | None, LARGE("Solve on N processes of this machine (extra [cluster]).", "N")] = None
-    scheduler: Annotated[Text, LARGE("Solve on the workers of the dask scheduler at HOST:PORT.", "ADDRESS")] = None
+    resume: Annotated[
+        bool, LARGE("Continue an interrupted run from its finished chunks.", None, "--resume")
+    ] = False
+    memory: Annotated[
+        Text, LARGE("Memory limit: 512MiB, 2GB (default: 500 to 600 MB).", "SIZE")
+    ] = None
+    workers: Annotated[
+        int | None, LARGE("Solve on N processes of this machine (extra [cluster]).", "N")
+    ] = None
+    scheduler: Annotated[
+        Text, LARGE("Solve on the workers of the dask scheduler at HOST:PORT.", "ADDRESS")
+    ] = None
 
 
 def cuts(given: Sequence[str] | None) -> dict[str, str]:
@@ -99,7 +120,9 @@ def displacements(texts: Sequence[str], g: float) -> list[float]:
         length = quantity("--displacement", text, "m", g)
         if length > _MOST_WITHOUT_UNIT and not text[-1].isalpha():
             units = f"give the unit: -d {text}mm or -d {text}m"
-            raise InputError(f"--displacement = {text}: without a unit that is {length:g} m; {units}")
+            raise InputError(
+                f"--displacement = {text}: without a unit that is {length:g} m; {units}"
+            )
         found.add(length)
     return check_values("displacement", sorted(found), "--displacement").tolist()
 
@@ -116,15 +139,18 @@ def in_own_units(typed: Mapping[str, Any], g: float) -> dict[str, Any]:
 def option_name(text: str) -> str:
     """An option as it is typed: ``--ramp-in`` for ``ramp_in``, also in a sum of several; what follows stays."""
     names = re.compile(r"\w+( \+ \w+)*")
-    return names.sub(lambda found: "--" + found[0].replace("_", "-").replace("+ ", "+ --"), text, count=1)
+    return names.sub(
+        lambda found: "--" + found[0].replace("_", "-").replace("+ ", "+ --"), text, count=1
+    )
 
 
 def command(task: str, *examples: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Add a command to the program, by what it is for; its examples stand below its help.
 
-    In place of parameters annotated with a family or a dataclass it has the options that these declare.  It gets the
-    choice made of a family, or None if its default is None and none of the options was typed; of a single choice
-    (`Reading`) the options typed, by name; of another dataclass, whose annotations are options of typer, an object.
+    In place of parameters annotated with a family or a dataclass it has the options that these
+    declare.  It gets the choice made of a family, or None if its default is None and none of the
+    options was typed; of a single choice (`Reading`) the options typed, by name; of another
+    dataclass, whose annotations are options of typer, an object.
     """
 
     def add(function: Callable[..., None]) -> Callable[..., None]:
@@ -133,9 +159,14 @@ def command(task: str, *examples: str) -> Callable[[Callable[..., None]], Callab
             function(**{name: _made(typed, choice) for name, choice in choices.items()}, **typed)
 
         given = inspect.signature(function).parameters
-        kinds = {name: (get_args(one.annotation) or (one.annotation,))[-1] for name, one in given.items()}
+        kinds = {
+            name: (get_args(one.annotation) or (one.annotation,))[-1] for name, one in given.items()
+        }
         choices = {name: kind for name, kind in kinds.items() if isinstance(kind, Family | type)}
-        expanded = (_options(choices[name], one.default) if name in choices else [one] for name, one in given.items())
+        expanded = (
+            _options(choices[name], one.default) if name in choices else [one]
+            for name, one in given.items()
+        )
         run.__signature__ = inspect.Signature([*itertools.chain(*expanded)])  # type: ignore[attr-defined]
         app.command(rich_help_panel=task, epilog="\n\n".join(("Examples:", *examples)))(run)
         return function
@@ -146,11 +177,14 @@ def command(task: str, *examples: str) -> Callable[[Callable[..., None]], Callab
 def _made(given: dict[str, Any], choice: Family[Any] | type[Any]) -> Any:
     """What a command gets for a choice; its options are taken from those given."""
     if isinstance(choice, Family):
-        name, typed = given.pop(choice.attribute), _typed(given, choice.options)
+        name = given.pop(choice.attribute)
+        typed = _typed(given, choice.options)
         if name is None and not typed:
             return None
         return choice.made(
-            name or choice.default, typed, lambda text: option_name(text.replace(choice.key, choice.attribute, 1))
+            name or choice.default,
+            typed,
+            lambda text: option_name(text.replace(choice.key, choice.attribute, 1)),
         )
     if not issubclass(choice, Choice):
         return choice(**{name: given.pop(name) for name in inspect.signature(choice).parameters})
@@ -169,7 +203,9 @@ def _typed(given: dict[str, Any], options: Mapping[str, Option]) -> dict[str, An
         try:
             found[name] = [float(one) for one in found[name].split(",")]
         except ValueError:
-            raise InputError(f"{option_name(name)} {found[name]}: must be numbers with commas between") from None
+            raise InputError(
+                f"{option_name(name)} {found[name]}: must be numbers with commas between"
+            ) from None
     return found
 
 
@@ -178,16 +214,27 @@ def _options(choice: Family[Any] | type[Any], default: Any) -> list[inspect.Para
     if not isinstance(choice, Family):
         if issubclass(choice, Choice):
             return [_declared(one, RARE) for one in declared(choice)]
-        return [one.replace(kind=one.KEYWORD_ONLY) for one in inspect.signature(choice).parameters.values()]
+        return [
+            one.replace(kind=one.KEYWORD_ONLY)
+            for one in inspect.signature(choice).parameters.values()
+        ]
     panel = SHAKING if choice.attribute == "waveform" else BLOCK
     names: Any = Literal[tuple(choice.names)]
-    note, first = (f" (default: {choice.default})", None) if default is None else ("", choice.default)
-    about = panel(f"{choice.keyword.capitalize()}: {', '.join(choice.names)}{note}.", "NAME", f"--{choice.attribute}")
+    note, first = (
+        (f" (default: {choice.default})", None) if default is None else ("", choice.default)
+    )
+    about = panel(
+        f"{choice.keyword.capitalize()}: {', '.join(choice.names)}{note}.",
+        "NAME",
+        f"--{choice.attribute}",
+    )
     found = [_parameter(choice.attribute, annotation=Annotated[names | None, about], default=first)]
     for name, one in choice.options.items():
         of = choice.having(name)
         every = len(of) == len(choice.choices)
-        found.append(_declared(one, panel) if every else _declared(one, RARE, f"with {', '.join(of)}"))
+        found.append(
+            _declared(one, panel) if every else _declared(one, RARE, f"with {', '.join(of)}")
+        )
     return found
 
 

@@ -18,16 +18,23 @@ from slipsweep.model.options import SOLVERS
 
 @options.command("Start", "slipsweep example", "slipsweep example paper")
 def example(
-    name: Annotated[options.Text, options.read("NAME", "Sweep file to write (default: list their names).")] = None,
+    name: Annotated[
+        options.Text, options.read("NAME", "Sweep file to write (default: list their names).")
+    ] = None,
     overwrite: options.Overwrite = False,
 ) -> None:
     """List the sweep files that come with slipsweep, or write one with its data."""
     # in the installed package, or at the top of the clone that is installed as it stands
     package = Path(__file__).parents[1]
-    folder = next(path for path in (package / "sweeps", package.parents[1] / "sweeps") if path.is_dir())
+    folder = next(
+        path for path in (package / "sweeps", package.parents[1] / "sweeps") if path.is_dir()
+    )
     sweeps = {path.stem: path for path in sorted(folder.glob("*.toml"))}
     if name is None:
-        titles = {stem: tomllib.loads(path.read_text("utf-8"))["output"]["title"] for stem, path in sweeps.items()}
+        titles = {
+            stem: tomllib.loads(path.read_text("utf-8"))["output"]["title"]
+            for stem, path in sweeps.items()
+        }
         echo(*(f"{stem:<14}{title}" for stem, title in titles.items()))
         return
     if name not in sweeps:
@@ -35,7 +42,11 @@ def example(
     from slipsweep.files import spec
 
     # the sweep file is among the files that are read for it
-    wanted = {path.relative_to(folder): path for path in spec.load(sweeps[name]).files if isinstance(path, Path)}
+    wanted = {
+        path.relative_to(folder): path
+        for path in spec.load(sweeps[name]).files
+        if isinstance(path, Path)
+    }
     present = [path for path in wanted if path.parent.is_dir()]
     outputs.check_outputs(present, overwrite, reads=list(wanted.values()))
     for path, source in wanted.items():
@@ -53,12 +64,19 @@ def example(
 )
 def run(
     *,
-    sweep: Annotated[Path, options.read("SWEEP.toml|OUT.nc", "Sweep file (-: standard input), or a result to repeat.")],
+    sweep: Annotated[
+        Path,
+        options.read("SWEEP.toml|OUT.nc", "Sweep file (-: standard input), or a result to repeat."),
+    ],
     solver: Annotated[
-        Literal["auto", "step", "cycle"] | None, options.Panel("Solver")("Solver, instead of solver.method.")
+        Literal["auto", "step", "cycle"] | None,
+        options.Panel("Solver")("Solver, instead of solver.method."),
     ] = None,
     output: Annotated[
-        str | None, options.written("File or store to write (default: output.path, else SWEEP.nc).", "OUT.nc|OUT.zarr")
+        str | None,
+        options.written(
+            "File or store to write (default: output.path, else SWEEP.nc).", "OUT.nc|OUT.zarr"
+        ),
     ] = None,
     large: Large,
 ) -> None:
@@ -70,31 +88,45 @@ def run(
 
     checked = spec.load(sweep)
     if solver is not None and checked.recorded is not None:
-        raise InputError(f"--solver {solver}: not allowed with recorded motions, to which the response is exact")
-    if solver is not None and solver != checked.solver.name:  # the same one keeps the options of the sweep file
+        raise InputError(
+            f"--solver {solver}: not allowed with recorded motions, to which the response is exact"
+        )
+    if (
+        solver is not None and solver != checked.solver.name
+    ):  # the same one keeps the options of the sweep file
         checked = replace(checked, solver=SOLVERS.of(solver))
     name = output or checked.output.path
     if name is None and spec.is_stream(sweep):
-        raise InputError(f"{sweep}: a sweep from a pipe has no name; name the output with -o or output.path")
+        raise InputError(
+            f"{sweep}: a sweep from a pipe has no name; name the output with -o or output.path"
+        )
     path = opening.place_of(name or f"{sweep.stem}.nc")
     outputs.check_endings([path], (".nc", ".zarr") if isinstance(path, Path) else (".zarr",))
-    started, compiled_before = time.perf_counter(), compiling.seconds
-    sampling, job = checked.sampling, jobs.sweep_job(checked)
+    started = time.perf_counter()
+    compiled_before = compiling.seconds
+    sampling = checked.sampling
+    job = jobs.sweep_job(checked)
     unit = "cells" if sampling is None else "samples"
     report = common.run_job(job, path, large, unit)
     if large.quiet:
         return
     template = job.plan.template()
     if not report.found:
-        cells, grid = job.plan.cells, grid_text(job.plan.sizes) or "no axes"
-        passed, once = time.perf_counter() - started, compiling.seconds - compiled_before
+        cells = job.plan.cells
+        grid = grid_text(job.plan.sizes) or "no axes"
+        passed = time.perf_counter() - started
+        once = compiling.seconds - compiled_before
         compiled = f" ({once:.2f} s to compile, once)" if once > 0.0 else ""
         took = f"in {passed:.2f} s{compiled}, {cells / max(passed - once, 1e-9):.3g} {unit}/s"
         if sampling is None:
             echo(f"{cells} cells ({grid}) {took}")
         else:
             points = math.prod(job.plan.sizes.values())
-            more = f", among {sampling.runs} runs each for Sobol indices" if sampling.sensitivity else ""
+            more = (
+                f", among {sampling.runs} runs each for Sobol indices"
+                if sampling.sensitivity
+                else ""
+            )
             pooled = f"{template.attrs['pooled']} x " if "pooled" in template.attrs else ""
             echo(f"{points} grid points ({grid}), {pooled}{sampling.samples} samples each{more}")
             echo(f"{cells} samples solved {took}")

@@ -26,21 +26,38 @@ class Typed:
     yield_acceleration: Annotated[
         Text, BLOCK("Yield acceleration: 0.1g, 0.98 (m/s²) (default: Coulomb's).", "VALUE")
     ] = None
-    yield_coefficient: Annotated[float | None, RARE("Üy/g of Newmark's block, instead of --theta and --mu-s.")] = None
-    decay_rate: Annotated[float | None, BLOCK("Friction decay λ (default: Eq. 6 at the peak).")] = None
-    delta_mu: Annotated[float | None, BLOCK("Friction above static Δμ (default: Eqs. 10, 11).")] = None
-    minimum_friction: Annotated[float | None, BLOCK("Minimum friction μmin (default: Eq. 9).")] = None
+    yield_coefficient: Annotated[
+        float | None, RARE("Üy/g of Newmark's block, instead of --theta and --mu-s.")
+    ] = None
+    decay_rate: Annotated[float | None, BLOCK("Friction decay λ (default: Eq. 6 at the peak).")] = (
+        None
+    )
+    delta_mu: Annotated[float | None, BLOCK("Friction above static Δμ (default: Eqs. 10, 11).")] = (
+        None
+    )
+    minimum_friction: Annotated[float | None, BLOCK("Minimum friction μmin (default: Eq. 9).")] = (
+        None
+    )
     structure_frequency: Annotated[
         Text, RARE("Natural frequency of the structure, Hz: flag flexible_block.", "VALUE")
     ] = None
-    amplitude: Annotated[Text, SHAKING("Peak ground acceleration: 0.36g, 3.5 (m/s²).", "VALUE")] = None
+    amplitude: Annotated[Text, SHAKING("Peak ground acceleration: 0.36g, 3.5 (m/s²).", "VALUE")] = (
+        None
+    )
     displacement_amplitude: Annotated[
-        Text, SHAKING("Peak ground displacement instead: 30mm, 0.03 (m); not with a record.", "VALUE")
+        Text,
+        SHAKING("Peak ground displacement instead: 30mm, 0.03 (m); not with a record.", "VALUE"),
     ] = None
-    frequency: Annotated[Text, SHAKING("Excitation frequency, Hz; not with a record.", "VALUE")] = None
-    scale: Annotated[float | None, SHAKING("Factor on a record's acceleration (default: 1).")] = None
+    frequency: Annotated[Text, SHAKING("Excitation frequency, Hz; not with a record.", "VALUE")] = (
+        None
+    )
+    scale: Annotated[float | None, SHAKING("Factor on a record's acceleration (default: 1).")] = (
+        None
+    )
     pgv: Annotated[Text, RARE("Peak ground velocity to scale a record to: 40cm/s.", "VALUE")] = None
-    arias_intensity: Annotated[Text, RARE("Arias intensity to scale a record to, m/s.", "VALUE")] = None
+    arias_intensity: Annotated[
+        Text, RARE("Arias intensity to scale a record to, m/s.", "VALUE")
+    ] = None
     time_scale: Annotated[float | None, RARE("Factor on a record's time (default: 1).")] = None
     polarity: Annotated[
         int | None, SHAKING("Sign of a record, 1 or -1; 1: positive drives downslope (default: 1).")
@@ -57,24 +74,39 @@ def simulate(
     typed: Typed,
     model: Annotated[Model, MODELS],
     excitation: Annotated[Waveform | None, WAVEFORMS] = None,
-    record: Annotated[File, SHAKING("A recorded motion: CSV, PEER AT2, K-NET, COSMOS or ESM text.", "FILE")] = None,
+    record: Annotated[
+        File, SHAKING("A recorded motion: CSV, PEER AT2, K-NET, COSMOS or ESM text.", "FILE")
+    ] = None,
     reading: Annotated[Mapping[str, Any], Reading],
-    output: Annotated[options.Paths, options.written("Write .nc, .csv, .png, .svg or .pdf; may be repeated.")] = None,
+    output: Annotated[
+        options.Paths, options.written("Write .nc, .csv, .png, .svg or .pdf; may be repeated.")
+    ] = None,
     overwrite: options.Overwrite = False,
-    points: Annotated[int | None, OUTPUT("Points in time per cycle of a waveform (default: 512).", min=4)] = None,
+    points: Annotated[
+        int | None, OUTPUT("Points in time per cycle of a waveform (default: 512).", min=4)
+    ] = None,
     quiet: options.Quiet = False,
 ) -> None:
     """Compute the time history of one case, as files and a figure."""
     paths = outputs.check_outputs(
-        output, overwrite, reads=[record] if record else [], endings=(".nc", ".csv", *common.FIGURES)
+        output,
+        overwrite,
+        reads=[record] if record else [],
+        endings=(".nc", ".csv", *common.FIGURES),
     )
     with_unit = options.in_own_units(vars(typed), model.g)
-    taken = ((name, common.range_text(name, (value,), model.g)) for name, value in with_unit.items())
+    taken = (
+        (name, common.range_text(name, (value,), model.g)) for name, value in with_unit.items()
+    )
     taken_as = ", ".join(f"{name.replace('_', ' ')} {text}" for name, text in taken)
     for name in reading if record is None else ():
-        raise InputError(f"{options.option_name(name)}: only with --record, the file of a recorded motion")
+        raise InputError(
+            f"{options.option_name(name)}: only with --record, the file of a recorded motion"
+        )
     if record is not None and excitation is not None:
-        raise InputError(f"--waveform {excitation.name}: not allowed with --record, which is the shaking itself")
+        raise InputError(
+            f"--waveform {excitation.name}: not allowed with --record, which is the shaking itself"
+        )
     from slipsweep.motion.records import read_record
     from slipsweep.studies.history import simulate as simulated
 
@@ -82,7 +114,11 @@ def simulate(
         recorded = None if record is None else read_record(record, **reading)
     except InputError as error:  # options as they are typed: --gaps linear for gaps = 'linear'
         raise InputError(re.sub(r"\b(\w+) = '([^']*)'", r"--\1 \2", str(error))) from None
-    given: dict[str, Any] = {**vars(typed), **with_unit, "excitation": recorded or excitation or WAVEFORMS.default}
+    given: dict[str, Any] = {
+        **vars(typed),
+        **with_unit,
+        "excitation": recorded or excitation or WAVEFORMS.default,
+    }
     table = simulated(**given, model=model, points_per_cycle=points)
     validity = variables.Validity(table["validity"].item())
     if flags := validity & variables.VALUELESS:
@@ -90,9 +126,19 @@ def simulate(
         raise RunError(f"the model gives no value: {why} ({taken_as})")
 
     table.attrs["title"] = "Time history of a sliding block"
-    titles = {name: f"{name} ({table[name].attrs['units']})" for name in ("time", *variables.HISTORY) if name in table}
+    titles = {
+        name: f"{name} ({table[name].attrs['units']})"
+        for name in ("time", *variables.HISTORY)
+        if name in table
+    }
     frame = table[[*titles][1:]].to_dataframe().reset_index()[[*titles]].rename(columns=titles)
-    common.write_outputs(paths, overwrite, table, recorded, csv=lambda: frame.to_csv(index=False, lineterminator="\n"))
+    common.write_outputs(
+        paths,
+        overwrite,
+        table,
+        recorded,
+        csv=lambda: frame.to_csv(index=False, lineterminator="\n"),
+    )
     if quiet:
         return
     if recorded is not None:
@@ -100,7 +146,9 @@ def simulate(
     echo(f"permanent displacement  {table['permanent_displacement'].item():.6g} m")
     echo(f"peak relative velocity  {table['peak_relative_velocity'].item():.6g} m/s")
     if "sliding_mode" in table:
-        echo(f"sliding mode            {variables.SlidingMode(table['sliding_mode'].item()).name.lower()}")
+        echo(
+            f"sliding mode            {variables.SlidingMode(table['sliding_mode'].item()).name.lower()}"
+        )
     counts = (name for name in variables.RECORD_COUNTS if name in table)
     echo(*(f"{name.replace('_', ' '):<24}{table[name].item()}" for name in counts))
     echo(f"inputs                  {table.attrs['friction_inputs']}")

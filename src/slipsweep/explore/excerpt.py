@@ -16,10 +16,17 @@ from slipsweep.charts.solved import with_amplitude
 from slipsweep.errors import InputError
 from slipsweep.files.opening import open_result
 from slipsweep.files.selection import axis_labels, axis_numbers
-from slipsweep.model.variables import PARAMETERS, RESULTS, STATISTIC_COORDINATES, STATISTICS, STRENGTHS
+from slipsweep.model.variables import (
+    PARAMETERS,
+    RESULTS,
+    STATISTIC_COORDINATES,
+    STATISTICS,
+    STRENGTHS,
+)
 from slipsweep.studies.suite_statistics import suite_statistics
 
-#: What can be chosen for the map, in the order in which it is offered, and in words that fit on a phone.
+#: What can be chosen for the map, in the order in which it is offered, and in words that fit on a
+#: phone.
 LAYERS = {
     "permanent_displacement": "displacement",
     "newmark_displacement": "Newmark's displacement",
@@ -29,9 +36,13 @@ LAYERS = {
 }
 
 #: What a page shows of a cell, and its type in the page.
-SHOWN = dict.fromkeys((*LAYERS, "valueless_share"), "<f4") | {"sliding_mode": "<i1", "validity": "<i2"}
+SHOWN = dict.fromkeys((*LAYERS, "valueless_share"), "<f4") | {
+    "sliding_mode": "<i1",
+    "validity": "<i2",
+}
 
-#: Dimensions of which statistics are made, or which are statistics themselves: none of their values is left out.
+#: Dimensions of which statistics are made, or which are statistics themselves: none of their values
+#: is left out.
 _WHOLE = ("polarity", "motion", "quantile", "threshold")
 
 #: Largest magnitude of a coordinate: products of a few of them are still numbers.
@@ -41,17 +52,25 @@ _VERTICAL = ("amplitude", "displacement_amplitude", *STRENGTHS[1:])
 
 
 def thinned_lengths(
-    lengths: Mapping[str, int], cells: int, map_dims: Sequence[str] = (), whole: Collection[str] = ()
+    lengths: Mapping[str, int],
+    cells: int,
+    map_dims: Sequence[str] = (),
+    whole: Collection[str] = (),
 ) -> dict[str, int]:
     """Lengths of the axes of a grid cut down to a number of cells, the longest cut first.
 
-    Four values of a dimension of the map count as one of another, since a map needs more of them than a slider; it
-    keeps two values.  Dimensions in `whole` are not cut.
+    Four values of a dimension of the map count as one of another, since a map needs more of them
+    than a slider; it keeps two values.  Dimensions in `whole` are not cut.
     """
     left = dict(lengths)
-    least = {dim: n if dim in whole else min(n, 2) if dim in map_dims else 1 for dim, n in lengths.items()}
+    least = {
+        dim: n if dim in whole else min(n, 2) if dim in map_dims else 1
+        for dim, n in lengths.items()
+    }
     while math.prod(left.values()) > cells:
-        spare = {dim: n / (4 if dim in map_dims else 1) for dim, n in left.items() if n > least[dim]}
+        spare = {
+            dim: n / (4 if dim in map_dims else 1) for dim, n in left.items() if n > least[dim]
+        }
         if not spare:
             break
         longest = max(spare, key=lambda dim: spare[dim])
@@ -69,9 +88,9 @@ def evenly(length: int, kept: int) -> NDArray[np.intp]:
 class Excerpt:
     """What a page shows of a result.
 
-    `table` has the coordinates, which increase along each dimension, and the results in `SHOWN`; `map_dims` are the
-    dimensions up and across the map; `lengths` are those of the file, `sizes` those of the page; `labels` are names
-    along dimensions that have no numbers: cases and motions.
+    `table` has the coordinates, which increase along each dimension, and the results in `SHOWN`;
+    `map_dims` are the dimensions up and across the map; `lengths` are those of the file, `sizes`
+    those of the page; `labels` are names along dimensions that have no numbers: cases and motions.
     """
 
     table: xr.Dataset
@@ -108,20 +127,30 @@ def read_excerpt(path: Path, cells: int) -> Excerpt:
     map_dims = _map_dims(path, lengths)
     left = thinned_lengths(lengths, cells, map_dims, _WHOLE)
     if math.prod(left.values()) > cells:
-        raise InputError(f"{path}: a grid of {len(lengths)} dimensions does not fit into a page of this size")
+        raise InputError(
+            f"{path}: a grid of {len(lengths)} dimensions does not fit into a page of this size"
+        )
     keep = {dim: evenly(length, left[dim]) for dim, length in lengths.items()}
-    table = with_amplitude(result[names].isel(keep).transpose(*lengths, ...).load(scheduler="single-threaded"))
+    table = with_amplitude(
+        result[names].isel(keep).transpose(*lengths, ...).load(scheduler="single-threaded")
+    )
     for name in names:
         beyond = [dim for dim in table[name].dims if dim not in lengths]
         if beyond:
-            raise InputError(f"{path}: {name}: lies along {beyond[0]}, along which no displacement does")
+            raise InputError(
+                f"{path}: {name}: lies along {beyond[0]}, along which no displacement does"
+            )
         table[name] = table[name].astype(SHOWN[name]).assign_attrs((STATISTICS | RESULTS)[name])
     labels = {dim: axis_labels(table, dim) for dim in lengths if dim not in PARAMETERS}
-    table = xr.Dataset({name: table[name].variable for name in names}, _coordinates(path, table), result.attrs)
+    table = xr.Dataset(
+        {name: table[name].variable for name in names}, _coordinates(path, table), result.attrs
+    )
     if "motion" in left and {"permanent_displacement", "validity"} <= {*names}:
         table = _with_statistics(table)
         left |= {dim: table.sizes[dim] for dim in ("quantile", "threshold")}
-    return Excerpt(table, map_dims, lengths, left, {dim: texts for dim, texts in labels.items() if texts})
+    return Excerpt(
+        table, map_dims, lengths, left, {dim: texts for dim, texts in labels.items() if texts}
+    )
 
 
 def _with_statistics(table: xr.Dataset) -> xr.Dataset:
@@ -137,7 +166,11 @@ def _with_statistics(table: xr.Dataset) -> xr.Dataset:
 
 def _map_dims(path: Path, lengths: Mapping[str, int]) -> tuple[str, str]:
     """The dimensions up and across the map: the strength of the shaking over its frequency, or what there is."""
-    axes = [dim for dim, length in lengths.items() if length > 1 and dim in PARAMETERS and dim != "polarity"]
+    axes = [
+        dim
+        for dim, length in lengths.items()
+        if length > 1 and dim in PARAMETERS and dim != "polarity"
+    ]
     axes.sort(key=lambda dim: -lengths[dim])
     axes += [dim for dim in ("motion",) if lengths.get(dim, 1) > 1]
     if len(axes) < 2:

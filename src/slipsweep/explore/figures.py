@@ -5,14 +5,24 @@ from typing import Any
 
 import numpy as np
 
-from slipsweep.charts.style import BLUE, SYMBOLS, VERMILION, Options, axis_label, is_acceleration, length_text
+from slipsweep.charts.style import (
+    BLUE,
+    SYMBOLS,
+    VERMILION,
+    Options,
+    axis_label,
+    is_acceleration,
+    length_text,
+)
 from slipsweep.explore.excerpt import Excerpt
 from slipsweep.model.variables import PARAMETERS, RESULTS, STATISTIC_COORDINATES, STATISTICS
 
 
 def about(name: str) -> dict[str, Any]:
     """What is known of a result or a dimension: its long name and unit."""
-    return (PARAMETERS | STATISTIC_COORDINATES | STATISTICS | RESULTS).get(name, {"long_name": name, "units": "1"})
+    return (PARAMETERS | STATISTIC_COORDINATES | STATISTICS | RESULTS).get(
+        name, {"long_name": name, "units": "1"}
+    )
 
 
 def scale_of(name: str) -> str:
@@ -28,13 +38,18 @@ def label(name: str, log: bool = False) -> str:
 
 def decades(excerpt: Excerpt) -> tuple[int, int]:
     """Powers of ten, in mm, that the colours span: those of nine cells in ten, five at most and from 1 mm up."""
-    lengths = [excerpt.table[name].values.ravel() for name in excerpt.layers if scale_of(name) == "displacement"]
+    lengths = [
+        excerpt.table[name].values.ravel()
+        for name in excerpt.layers
+        if scale_of(name) == "displacement"
+    ]
     values = np.concatenate([np.zeros(0), *lengths])
     positive = values[np.isfinite(values) & (values > 0.0)]
     if positive.size == 0:
         return 0, 1
     fifth, ninety_fifth = np.log10(np.percentile(positive, (5.0, 95.0)) * 1000.0)
-    low, high = math.floor(fifth), max(math.ceil(ninety_fifth), math.floor(fifth) + 1)
+    low = math.floor(fifth)
+    high = max(math.ceil(ninety_fifth), math.floor(fifth) + 1)
     if high - low > 5:
         low = min(max(low, 0), high - 5)
     return low, min(high, low + 5)
@@ -74,17 +89,33 @@ def _map(excerpt: Excerpt) -> Any:
     marks = ColumnDataSource({"image": [np.zeros((1, 1), np.uint32)], **corner}, name="marks")
     for scale in {scale_of(name): None for name in excerpt.layers}:
         mapper, bar = _colours(scale, decades(excerpt))
-        chart.image(image="image", **place, color_mapper=mapper, source=colours, name=f"colours-{scale}")
+        chart.image(
+            image="image", **place, color_mapper=mapper, source=colours, name=f"colours-{scale}"
+        )
         chart.add_layout(bar, "above")
     chart.image_rgba(image="image", **place, source=marks)
     held = ColumnDataSource({"x": [], "y": []}, name="held")
     chart.scatter(
-        "x", "y", source=held, size=3, marker="circle", fill_color="white", line_color="black", line_width=0.7
+        "x",
+        "y",
+        source=held,
+        size=3,
+        marker="circle",
+        fill_color="white",
+        line_color="black",
+        line_width=0.7,
     )
     chosen = ColumnDataSource({"x": [1.0], "y": [1.0]}, name="chosen")
     for colour, width in (("white", 5), ("black", 2)):
         chart.scatter(
-            "x", "y", source=chosen, size=15, marker="circle", fill_color=None, line_color=colour, line_width=width
+            "x",
+            "y",
+            source=chosen,
+            size=15,
+            marker="circle",
+            fill_color=None,
+            line_color=colour,
+            line_width=width,
         )
     if is_acceleration(up):
         _add_g(chart, excerpt.is_log(up))
@@ -97,7 +128,9 @@ def _plain_ticks(axis: Any, log: bool) -> None:
 
     axis.axis_label_text_font_style = "normal"
     if log:
-        axis.ticker = FixedTicker(ticks=[digit * 10.0**power for power in range(-9, 10) for digit in (1, 2, 5)])
+        axis.ticker = FixedTicker(
+            ticks=[digit * 10.0**power for power in range(-9, 10) for digit in (1, 2, 5)]
+        )
         axis.formatter = PrintfTickFormatter(format="%g")
 
 
@@ -118,7 +151,9 @@ def _colours(scale: str, span: tuple[int, int]) -> tuple[Any, Any]:
     }
     if scale == "displacement":
         mapper: Any = LogColorMapper(low=10.0**low, high=10.0**high, **shared)
-        ticks: dict[Any, Any] = {10.0**power: length_text(10.0 ** (power - 3)) for power in range(low, high + 1)}
+        ticks: dict[Any, Any] = {
+            10.0**power: length_text(10.0 ** (power - 3)) for power in range(low, high + 1)
+        }
     else:
         mapper = LinearColorMapper(low=0.0, high=1.0, **shared)
         ticks = {tenths / 10: f"{tenths / 10:g}" for tenths in range(0, 11, 2)}
@@ -157,8 +192,11 @@ def _panels() -> Any:
     from bokeh.models import ColumnDataSource, DataRange1d, Range1d
     from bokeh.plotting import figure
 
-    history = ColumnDataSource({name: [0.0] for name in ("t", "ground", "block", "v", "u")}, name="history")
-    times, panels = DataRange1d(range_padding=0), []
+    history = ColumnDataSource(
+        {name: [0.0] for name in ("t", "ground", "block", "v", "u")}, name="history"
+    )
+    times = DataRange1d(range_padding=0)
+    panels = []
     for name, (text, height, lines) in _PANELS.items():
         panel: Any = figure(
             name=name,
@@ -176,7 +214,14 @@ def _panels() -> Any:
         for one, legend in lines.items():
             look: dict[str, Any] = {"color": BLUE if one == "ground" else VERMILION}
             look |= {"line_dash": "dashed"} if one == "block" else {}
-            panel.line("t", one, source=history, line_width=1.8, **look, **({"legend_label": legend} if legend else {}))
+            panel.line(
+                "t",
+                one,
+                source=history,
+                line_width=1.8,
+                **look,
+                **({"legend_label": legend} if legend else {}),
+            )
         if name == "accelerations":
             panel.y_range = Range1d(start=-1, end=1, name="accelerations_range")
             panel.legend.update(orientation="horizontal", padding=1, border_line_color=None)

@@ -19,7 +19,8 @@ from slipsweep.motion.cutting import wave_of
 from slipsweep.motion.waveforms import WAVEFORMS
 
 #: Points a cycle, and how many cycles at most.
-POINTS, CYCLES = 64, 3
+POINTS = 64
+CYCLES = 3
 
 _COLUMNS = ("block_acceleration", "velocity", "displacement")
 
@@ -28,10 +29,11 @@ _COLUMNS = ("block_acceleration", "velocity", "displacement")
 class Histories:
     """Time histories of some cells over phase, from which the page scales them to any frequency: those at ω = 1 rad/s.
 
-    `keep` has the dimensions that histories depend on, and the indices of the excerpt that have them.  `phase` (rad)
-    has the points of `cycles` cycles, `ground` the ground acceleration over its amplitude.  `values`, of shape
-    (..., quantity, point), are block acceleration, relative velocity and displacement in units of `scale`, of shape
-    (..., quantity), which is NaN where a cell has no history.
+    `keep` has the dimensions that histories depend on, and the indices of the excerpt that have
+    them.  `phase` (rad) has the points of `cycles` cycles, `ground` the ground acceleration over
+    its amplitude.  `values`, of shape (..., quantity, point), are block acceleration, relative
+    velocity and displacement in units of `scale`, of shape (..., quantity), which is NaN where a
+    cell has no history.
     """
 
     keep: dict[str, NDArray[np.intp]]
@@ -45,9 +47,10 @@ class Histories:
 def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
     """Compute the histories of as many cells, evenly spaced, as fit into `most_bytes`.
 
-    They depend on time through the phase only: v(f) = V/ω and u(f) = W/ω², so that one history serves all frequencies
-    and the page scales it (MODEL, motion rules).  None where the shaking is not periodic or ends with a ramp beyond the
-    cycles shown, where inputs are uncertain, or where not even one history fits.
+    They depend on time through the phase only: v(f) = V/ω and u(f) = W/ω², so that one history
+    serves all frequencies and the page scales it (MODEL, motion rules).  None where the shaking is
+    not periodic or ends with a ramp beyond the cycles shown, where inputs are uncertain, or where
+    not even one history fits.
     """
     table = excerpt.table
     if "waveform" not in table.attrs or "permanent_displacement" not in table:
@@ -55,8 +58,17 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
     motion = WAVEFORMS.from_attributes(table.attrs)
     if motion.cycles > CYCLES and motion.ramp_out > 0.0:
         return None  # the first cycles alone have no ramp at their end
-    others = ("phi", "frequency", "displacement_amplitude", "structure_frequency", "quantile", "threshold")
-    inputs = {str(name): one for name, one in table.coords.items() if name not in others}  # phi: by mu_s
+    others = (
+        "phi",
+        "frequency",
+        "displacement_amplitude",
+        "structure_frequency",
+        "quantile",
+        "threshold",
+    )
+    inputs = {
+        str(name): one for name, one in table.coords.items() if name not in others
+    }  # phi: by mu_s
     depends = {str(dim) for one in inputs.values() for dim in one.dims}
     sizes = {dim: size for dim, size in excerpt.sizes.items() if dim in depends}
     cycles = min(motion.cycles, CYCLES)
@@ -68,18 +80,27 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
     if math.prod(left.values()) > most:
         return None
     keep = {dim: evenly(length, left[dim]) for dim, length in sizes.items()}
-    # other names of dimensions: `frequency` is one where accelerations were given as displacements of the base
+    # other names of dimensions: `frequency` is one where accelerations were given as displacements
+    # of the base
     renamed = {dim: f"{dim} of the page" for dim in left}
     left = {renamed[dim]: length for dim, length in left.items()}
     kept = {name: one.isel(keep, missing_dims="ignore") for name, one in inputs.items()}
-    given = {name: xr.DataArray(one.values, dims=[renamed[str(dim)] for dim in one.dims]) for name, one in kept.items()}
-    motion, model = replace(motion, cycles=cycles), MODELS.from_attributes(table.attrs)
+    given = {
+        name: xr.DataArray(one.values, dims=[renamed[str(dim)] for dim in one.dims])
+        for name, one in kept.items()
+    }
+    motion = replace(motion, cycles=cycles)
+    model = MODELS.from_attributes(table.attrs)
     at_one = Inputs(**given, frequency=1.0 / (2.0 * math.pi))  # ω = 1 rad/s
     plan = plans.plan_sweep(at_one, excitation=motion, model=model, variables=("validity",))
     has_values = (plan.solve()["validity"].variable.set_dims(left).values & VALUELESS) == 0
-    problem, wave = Problem(model, motion, Cycle()), wave_of(motion)
+    problem = Problem(model, motion, Cycle())
+    wave = wave_of(motion)
     fields = engine.cell_inputs(problem, plan.coords)
-    cells = {name: fields.get(name, xr.Variable((), math.nan)).set_dims(left).values for name in Cell._fields}
+    cells = {
+        name: fields.get(name, xr.Variable((), math.nan)).set_dims(left).values
+        for name in Cell._fields
+    }
     shared = solvers.options_of(problem, wants_peak=True), wave, workspace_of(wave, keeps_log=True)
     phase = np.linspace(0.0, 2.0 * math.pi * cycles, points)
     ground = np.zeros(points)
@@ -94,7 +115,9 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
             largest = np.abs(columns).max(axis=1)
             scale[at] = largest / 32767.0
             with np.errstate(invalid="ignore"):
-                values[at] = np.where(largest[:, None] > 0.0, columns / largest[:, None] * 32767.0, 0.0).round()
+                values[at] = np.where(
+                    largest[:, None] > 0.0, columns / largest[:, None] * 32767.0, 0.0
+                ).round()
         if cell.amplitude > 0.0:
             ground = samples.ground_acceleration / cell.amplitude
     return Histories(keep, phase, ground, values, scale, cycles)

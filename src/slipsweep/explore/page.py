@@ -1,11 +1,12 @@
 """A page to explore a result in: one HTML file that needs neither server nor network.
 
-Bokeh draws (its library, 1.3 MB, is put into the page), `page.js` beside this file moves the numbers: it looks
-up cells and scales them by the laws below, and computes no physics.  Everything it shows was computed by
-slipsweep and lies in the page as deflated little-endian arrays in base64.
+Bokeh draws (its library, 1.3 MB, is put into the page), `page.js` beside this file moves the
+numbers: it looks up cells and scales them by the laws below, and computes no physics.  Everything
+it shows was computed by slipsweep and lies in the page as deflated little-endian arrays in base64.
 
-What comes from a file meets the page in its template alone, which escapes it: text as HTML, all else in one element
-of JSON.  The page's policy runs two scripts, known by their digests: Bokeh's library and `page.js`.
+What comes from a file meets the page in its template alone, which escapes it: text as HTML, all
+else in one element of JSON.  The page's policy runs two scripts, known by their digests: Bokeh's
+library and `page.js`.
 """
 
 import base64
@@ -38,7 +39,8 @@ _CELLS_SHARE = 0.75
 #: Some thousands of histories: beyond them another one shows nothing new.
 _HISTORIES_BYTES = 4_500_000
 
-#: Powers by which displacements follow from one frequency to others, and from one time scale (MODEL, motion rules).
+#: Powers by which displacements follow from one frequency to others, and from one time scale
+#: (MODEL, motion rules).
 _LAWS = {"frequency": -2.0, "time_scale": 2.0}
 
 #: An array in the page: type, shape, what else is known of it, and its deflated bytes in base64.
@@ -48,7 +50,12 @@ Array = dict[str, Any]
 def packed(values: NDArray[Any], **about: Any) -> Array:
     """Deflate an array."""
     data = zlib.compress(np.ascontiguousarray(values).tobytes())
-    return {"dtype": values.dtype.str[1:], "shape": values.shape, **about, "data": base64.b64encode(data).decode()}
+    return {
+        "dtype": values.dtype.str[1:],
+        "shape": values.shape,
+        **about,
+        "data": base64.b64encode(data).decode(),
+    }
 
 
 def cell_arrays(excerpt: Excerpt) -> dict[str, Array]:
@@ -57,7 +64,9 @@ def cell_arrays(excerpt: Excerpt) -> dict[str, Array]:
     for name in filter(excerpt.table.__contains__, SHOWN):
         variable = excerpt.table[name]
         values = variable.values.reshape([variable.sizes.get(dim, 1) for dim in excerpt.sizes])
-        values, law = _by_law(excerpt, values) if scale_of(name) == "displacement" else (values, None)
+        values, law = (
+            _by_law(excerpt, values) if scale_of(name) == "displacement" else (values, None)
+        )
         arrays[name] = packed(values, dims=variable.dims, law=law)
     for key, coord in excerpt.table.coords.items():
         if key not in coord.dims:
@@ -78,11 +87,13 @@ def _by_law(excerpt: Excerpt, values: NDArray[Any]) -> tuple[NDArray[Any], dict[
     return values, None
 
 
-def write_page(path: Path, output: Path, *, size: int = PAGE_BYTES, overwrite: bool = False) -> Excerpt:
+def write_page(
+    path: Path, output: Path, *, size: int = PAGE_BYTES, overwrite: bool = False
+) -> Excerpt:
     """Write the page of a result, of at most `size` bytes, complete or not at all; return what it shows.
 
-    InputError: the file cannot be read or drawn, `size` is too small, Bokeh is not installed, or the output exists.
-    RunError: writing failed.
+    InputError: the file cannot be read or drawn, `size` is too small, Bokeh is not installed, or
+    the output exists. RunError: writing failed.
     """
     from jinja2 import Environment, PackageLoader
     from markupsafe import Markup
@@ -92,9 +103,12 @@ def write_page(path: Path, output: Path, *, size: int = PAGE_BYTES, overwrite: b
     overhead = len(bokeh.encode()) + 150_000  # figures and notes
     least = overhead + 50_000
     if size < least:
-        raise InputError(f"--size = {size_text(size)}: must be {size_text(least)} at least, most of it Bokeh's library")
+        raise InputError(
+            f"--size = {size_text(size)}: must be {size_text(least)} at least, most of it Bokeh's library"
+        )
     left = size - overhead
-    # where frequencies follow from one another a cell takes next to nothing; if they do not, again with less
+    # where frequencies follow from one another a cell takes next to nothing; if they do not, again
+    # with less
     cells = left // 2
     while True:
         excerpt = read_excerpt(path, cells)
@@ -108,11 +122,16 @@ def write_page(path: Path, output: Path, *, size: int = PAGE_BYTES, overwrite: b
     if histories is not None:
         arrays["histories"] = packed(histories.values.astype("<i2"))
         arrays["history_scale"] = packed(histories.scale.astype("<f4"))
-    name = path.name.encode(errors="backslashreplace").decode()  # it may have bytes that are no UTF-8
+    name = path.name.encode(
+        errors="backslashreplace"
+    ).decode()  # it may have bytes that are no UTF-8
     attrs = excerpt.table.attrs
     files = PackageLoader("slipsweep", "explore")
     environment = Environment(loader=files, autoescape=True)
-    environment.policies["json.dumps_kwargs"] = {"sort_keys": False, "allow_nan": False}  # Bokeh's have an order
+    environment.policies["json.dumps_kwargs"] = {
+        "sort_keys": False,
+        "allow_nan": False,
+    }  # Bokeh's have an order
     script = files.get_source(environment, "page.js")[0]
     text = environment.get_template("page.html").render(
         title=attrs.get("title", name),
@@ -141,11 +160,15 @@ def _bokeh_script() -> str:
     try:
         from bokeh.resources import Resources
     except ImportError:
-        raise InputError('explore draws with Bokeh, which is not installed: pip install "slipsweep[explore]"') from None
+        raise InputError(
+            'explore draws with Bokeh, which is not installed: pip install "slipsweep[explore]"'
+        ) from None
     return "\n".join(Resources(mode="inline", components=["bokeh"]).js_raw)
 
 
-def _contents(excerpt: Excerpt, arrays: Mapping[str, Array], histories: Histories | None) -> dict[str, Any]:
+def _contents(
+    excerpt: Excerpt, arrays: Mapping[str, Array], histories: Histories | None
+) -> dict[str, Any]:
     """What `page.js` shows, and what it needs to know of it."""
     table = excerpt.table
     return {
@@ -155,24 +178,38 @@ def _contents(excerpt: Excerpt, arrays: Mapping[str, Array], histories: Historie
             | {"labels": excerpt.labels.get(dim, [])}
             for dim in excerpt.sizes
         ],
-        "coords": {key: _dimension(str(key)) for key, coord in table.coords.items() if key not in coord.dims},
+        "coords": {
+            key: _dimension(str(key))
+            for key, coord in table.coords.items()
+            if key not in coord.dims
+        },
         "map": {"y": excerpt.map_dims[0], "x": excerpt.map_dims[1]},
         "layers": [
             {"name": name, "title": table[name].attrs["long_name"]}
             | {"short": LAYERS.get(name), "scale": scale_of(name)}
-            for name in (*excerpt.layers, *(["valueless_share"] if "valueless_share" in table else []))
+            for name in (
+                *excerpt.layers,
+                *(["valueless_share"] if "valueless_share" in table else []),
+            )
         ],
         "arrays": arrays,
         "figures": figures(excerpt),
         "modes": {int(mode): mode.name.lower() for mode in known.SlidingMode},
         "flags": [
-            {"mask": int(flag), "name": (flag.name or "").lower(), "kind": str(kind), "text": flag.text}
+            {
+                "mask": int(flag),
+                "name": (flag.name or "").lower(),
+                "kind": str(kind),
+                "text": flag.text,
+            }
             for kind in known.FlagKind
             for flag in known.flags_of(kind)
         ],
         "kinds": {str(kind): text for kind, text in known.FLAG_KIND_TEXT.items()},
         "cautions": int(known.flags_of(known.FlagKind.CAUTION)),
-        "unsound": int(known.flags_of(known.FlagKind.CAUTION) | known.flags_of(known.FlagKind.NO_VALUE)),
+        "unsound": int(
+            known.flags_of(known.FlagKind.CAUTION) | known.flags_of(known.FlagKind.NO_VALUE)
+        ),
         "g": float(table.attrs["g"]),
         "histories": histories
         and {
@@ -209,7 +246,10 @@ def _thinned(excerpt: Excerpt) -> list[tuple[str, str]]:
 
 def _notes(excerpt: Excerpt, histories: Histories | None) -> list[str]:
     """What the page leaves out, and how."""
-    shown, whole = (math.prod(sizes[dim] for dim in excerpt.lengths) for sizes in (excerpt.sizes, excerpt.lengths))
+    shown, whole = (
+        math.prod(sizes[dim] for dim in excerpt.lengths)
+        for sizes in (excerpt.sizes, excerpt.lengths)
+    )
     notes = [f"All {shown:,} cells of the file are in this page."]
     if shown < whole:
         notes = [

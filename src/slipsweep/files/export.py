@@ -30,10 +30,15 @@ if TYPE_CHECKING:
 CHUNK_CELLS = 2**18
 
 #: Endings of tables, the module that writes each, and the extra that brings it.
-SUFFIXES = {".csv": ("csv", ""), ".parquet": ("pyarrow.parquet", "parquet"), ".xlsx": ("xlsxwriter", "xlsx")}
+SUFFIXES = {
+    ".csv": ("csv", ""),
+    ".parquet": ("pyarrow.parquet", "parquet"),
+    ".xlsx": ("xlsxwriter", "xlsx"),
+}
 
 #: What a sheet of a spreadsheet can hold, the header included.
-MOST_ROWS, MOST_COLUMNS = 1_048_576, 16_384
+MOST_ROWS = 1_048_576
+MOST_COLUMNS = 16_384
 
 #: Beginnings of texts that a spreadsheet takes for formulas when it opens a CSV file.
 _FORMULAS = ("=", "+", "-", "@", "\t", "\r")
@@ -54,13 +59,14 @@ def export(
 ) -> int:
     """Write a result of slipsweep as a table, complete or not at all; return the number of rows, of all sheets.
 
-    The ending of `path` is one of `SUFFIXES`.  Results are `variables`, by default all; dimensions that none of them
-    has are left out.  Sliding modes and flags are codes or `words`, accelerations in m/s² or `in_g`, that of the model.
-    `at` says which values to keep of an axis, as `slipsweep.files.selection.places_at`.  With `columns`, the axis along
-    the columns of a pivoted table, `rows` are those along its rows.  `progress` is given how many rows there are, and
-    yields what to call with a number of rows just written.  InputError: `source` is not slipsweep's, `path` cannot be
-    written, a variable, axis or value is not in the file, a spreadsheet cannot hold the table, or the package is
-    missing that writes it.
+    The ending of `path` is one of `SUFFIXES`.  Results are `variables`, by default all; dimensions
+    that none of them has are left out.  Sliding modes and flags are codes or `words`, accelerations
+    in m/s² or `in_g`, that of the model. `at` says which values to keep of an axis, as
+    `slipsweep.files.selection.places_at`.  With `columns`, the axis along the columns of a pivoted
+    table, `rows` are those along its rows.  `progress` is given how many rows there are, and yields
+    what to call with a number of rows just written.  InputError: `source` is not slipsweep's,
+    `path` cannot be written, a variable, axis or value is not in the file, a spreadsheet cannot
+    hold the table, or the package is missing that writes it.
     """
     _check_format(path)
     check_outputs([path], overwrite, reads=[Path(source)])
@@ -69,14 +75,18 @@ def export(
         chosen = list(dict.fromkeys(result_names(whole) if variables is None else variables))
         for name in chosen:
             if name not in whole.data_vars:
-                raise InputError(f'{source}: no variable "{name}"; {did_you_mean(name, [*map(str, whole.data_vars)])}')
+                raise InputError(
+                    f'{source}: no variable "{name}"; {did_you_mean(name, [*map(str, whole.data_vars)])}'
+                )
         part = whole[chosen]
         widest = max((one.dims for one in part.data_vars.values()), key=len)
         dims = list(dict.fromkeys(map(str, (*widest, *part.sizes))))
         part = part.isel(places_at(whole, source, at or {}, dims))
         if columns is None:
             if rows:
-                raise InputError(f"--rows {','.join(rows)}: needs --columns, the axis whose values become columns")
+                raise InputError(
+                    f"--rows {','.join(rows)}: needs --columns, the axis whose values become columns"
+                )
             tables = [Table(part, Path(str(source)).stem, words, dims)]
         else:
             along = _pivot_rows(part, source, dims, rows, columns)
@@ -88,7 +98,9 @@ def export(
                     raise InputError(
                         f"{source}: --columns {columns}: not an axis of {name}; choose others with --variable"
                     )
-                tables.append(Table(one, name, words, [dim for dim in along if dim in one.sizes], columns))
+                tables.append(
+                    Table(one, name, words, [dim for dim in along if dim in one.sizes], columns)
+                )
         if path.suffix == ".xlsx":
             for table in tables:
                 table.check_size(source)
@@ -102,7 +114,9 @@ def export(
             progress(total) if progress else nullcontext() as told,
             complete_or_absent(path, overwrite) as temporary,
         ):
-            write = {".csv": _write_csv, ".parquet": _write_parquet, ".xlsx": _write_workbook}[path.suffix]
+            write = {".csv": _write_csv, ".parquet": _write_parquet, ".xlsx": _write_workbook}[
+                path.suffix
+            ]
             write(temporary, tables, source, told or (lambda rows: None))
     return total
 
@@ -124,7 +138,11 @@ def _in_g(table: xr.Dataset) -> xr.Dataset:
     found = table.copy()
     for name, one in table.variables.items():
         if one.attrs.get("units") == "m s-2":
-            found[name] = (one.dims, one.values / float(table.attrs["g"]), {**one.attrs, "units": "g"})
+            found[name] = (
+                one.dims,
+                one.values / float(table.attrs["g"]),
+                {**one.attrs, "units": "g"},
+            )
     return found
 
 
@@ -151,11 +169,17 @@ class Table:
         """Coordinates along the rows; of a long table also those of one value."""
         coords = self.part.drop_vars(MOTION_FILES, errors="ignore").coords
         names = [name for name in dict.fromkeys((*PARAMETERS, *map(str, coords))) if name in coords]
-        return [one for one in names if {*coords[one].dims} <= {*self.rows} and (coords[one].dims or not self.columns)]
+        return [
+            one
+            for one in names
+            if {*coords[one].dims} <= {*self.rows} and (coords[one].dims or not self.columns)
+        ]
 
     def check_size(self, source: object) -> None:
         """Refuse what a sheet cannot hold, and say what to cut."""
-        width = len(self.left) + (self.part.sizes[self.columns] if self.columns else len(self.part.data_vars))
+        width = len(self.left) + (
+            self.part.sizes[self.columns] if self.columns else len(self.part.data_vars)
+        )
         if width > MOST_COLUMNS or self.count >= MOST_ROWS:
             sizes = " x ".join(f"{self.part.sizes[dim]} {dim}" for dim in self.rows)
             raise InputError(
@@ -168,10 +192,15 @@ class Table:
         import pandas as pd
 
         across = self.part.sizes[self.columns] if self.columns else 1
-        for chunk in grid_chunks({dim: self.part.sizes[dim] for dim in self.rows}, max(1, cells // across)):
+        for chunk in grid_chunks(
+            {dim: self.part.sizes[dim] for dim in self.rows}, max(1, cells // across)
+        ):
             part = self.part.isel(chunk).load()
             shape = {dim: part.sizes[dim] for dim in self.rows}
-            found = {header(part[name]): part[name].variable.set_dims(shape).values.ravel() for name in self.left}
+            found = {
+                header(part[name]): part[name].variable.set_dims(shape).values.ravel()
+                for name in self.left
+            }
             shown: dict[Any, xr.DataArray] = {header(one): one for one in part.data_vars.values()}
             if self.columns is not None:
                 ((result, one),) = shown.items()
@@ -179,7 +208,9 @@ class Table:
                 corner = f"{last} \\ {self._across(self.columns, result)}"
                 found[corner] = found.pop(last, np.arange(1, 1 + math.prod(shape.values())))
                 values = axis_values(part, self.columns)
-                shown = {value: one.isel({self.columns: place}) for place, value in enumerate(values)}
+                shown = {
+                    value: one.isel({self.columns: place}) for place, value in enumerate(values)
+                }
             for title, one in shown.items():
                 found[title] = self._column(one, one.variable.set_dims(shape).values.ravel())
             yield pd.DataFrame(found)
@@ -187,7 +218,11 @@ class Table:
     def _across(self, columns: str, result: str) -> str:
         """What the columns of a pivoted table are, what it is of, and what it has one value of."""
         coords = self.part.coords
-        single = [name for name, one in coords.items() if one.size == 1 and name not in (*self.rows, columns)]
+        single = [
+            name
+            for name, one in coords.items()
+            if one.size == 1 and name not in (*self.rows, columns)
+        ]
         at = ", ".join(f"{name} = {values_text(coords[name])}" for name in single)
         across = header(coords[columns]) if columns in coords else columns
         return f"{across}: {result}" + (f" at {at}" if at else "")
@@ -201,8 +236,16 @@ class Table:
         missing = (values == -1) & (one.name in WITH_MISSING)
         about = (LIMIT_RESULTS | RESULTS).get(str(one.name), {}) | one.attrs
         if self.words and "flag_meanings" in about:
-            return pd.Series(values, dtype=object).map(_spelled(about, np.unique(values))).mask(missing)
-        return pd.Series(values, dtype=values.dtype.name.capitalize()).mask(missing) if missing.any() else values
+            return (
+                pd.Series(values, dtype=object)
+                .map(_spelled(about, np.unique(values)))
+                .mask(missing)
+            )
+        return (
+            pd.Series(values, dtype=values.dtype.name.capitalize()).mask(missing)
+            if missing.any()
+            else values
+        )
 
 
 def header(one: xr.DataArray) -> str:
@@ -212,77 +255,115 @@ def header(one: xr.DataArray) -> str:
 
 def _spelled(about: Mapping[str, Any], codes: Any) -> dict[Any, str]:
     """Codes in the words of a variable's attributes; flags one after the other."""
-    known = np.atleast_1d(about.get("flag_masks", about.get("flag_values", ()))).astype(int).tolist()
+    known = (
+        np.atleast_1d(about.get("flag_masks", about.get("flag_values", ()))).astype(int).tolist()
+    )
     words = list(zip(known, str(about["flag_meanings"]).split(), strict=False))
     if "flag_masks" in about:
         return {code: " ".join(word for mask, word in words if code & mask) for code in codes}
     return {code: dict(words).get(int(code), str(code)) for code in codes}
 
 
-def _pivot_rows(part: xr.Dataset, source: object, dims: Sequence[str], rows: Sequence[str], columns: str) -> list[str]:
+def _pivot_rows(
+    part: xr.Dataset, source: object, dims: Sequence[str], rows: Sequence[str], columns: str
+) -> list[str]:
     """The dimensions along the rows of a pivoted table (InputError: the axes are not those of such a table)."""
     for option, name in (*(("--rows", name) for name in rows), ("--columns", columns)):
         if name not in dims:
-            raise InputError(f"{source}: {option} {name}: no such axis here; {did_you_mean(name, dims)}")
+            raise InputError(
+                f"{source}: {option} {name}: no such axis here; {did_you_mean(name, dims)}"
+            )
     if columns in rows or len({*rows}) < len(rows):
         raise InputError(f"--rows {','.join(rows)} --columns {columns}: must be different axes")
     wide = [dim for dim in dims if dim not in (*rows, columns) and part.sizes[dim] > 1]
     if not rows and not wide:
-        raise InputError(f"{source}: --columns {columns}: no other axis has more than one value, none is left for rows")
+        raise InputError(
+            f"{source}: --columns {columns}: no other axis has more than one value, none is left for rows"
+        )
     if rows and wide:
         texts = ", ".join(f"{dim} ({part.sizes[dim]} values)" for dim in wide)
-        raise InputError(f"{source}: neither in --rows nor in --columns: {texts}; take one value of it with --at")
+        raise InputError(
+            f"{source}: neither in --rows nor in --columns: {texts}; take one value of it with --at"
+        )
     return list(rows) or wide
 
 
 # --------------------------------------------------------------------------------- formats
 
 
-def _write_csv(path: Path, tables: list[Table], source: object, done: Callable[[int], None]) -> None:
+def _write_csv(
+    path: Path, tables: list[Table], source: object, done: Callable[[int], None]
+) -> None:
     (table,) = tables
     with path.open("w", encoding="utf-8", newline="") as file:
         for number, frame in enumerate(table.frames(CHUNK_CELLS)):
             for name in frame.select_dtypes(["object", "string"]):
                 frame[name] = frame[name].map(
-                    lambda text: f"'{text}" if isinstance(text, str) and text.startswith(_FORMULAS) else text
+                    lambda text: (
+                        f"'{text}" if isinstance(text, str) and text.startswith(_FORMULAS) else text
+                    )
                 )
             frame.to_csv(file, index=False, header=number == 0, lineterminator="\n")
             done(len(frame))
 
 
-def _write_parquet(path: Path, tables: list[Table], source: object, done: Callable[[int], None]) -> None:
+def _write_parquet(
+    path: Path, tables: list[Table], source: object, done: Callable[[int], None]
+) -> None:
     import pyarrow
     from pyarrow import parquet
 
     (table,) = tables
-    first = pyarrow.Table.from_pandas(next(table.frames(1)).rename(columns=str), preserve_index=False).schema
-    about = {header(table.part[name]): table.part[name].attrs for name in (*table.left, *table.part.data_vars)}
+    first = pyarrow.Table.from_pandas(
+        next(table.frames(1)).rename(columns=str), preserve_index=False
+    ).schema
+    about = {
+        header(table.part[name]): table.part[name].attrs
+        for name in (*table.left, *table.part.data_vars)
+    }
     fields = [
-        field.with_metadata({key: str(value) for key, value in about.get(field.name, {}).items()}) for field in first
+        field.with_metadata({key: str(value) for key, value in about.get(field.name, {}).items()})
+        for field in first
     ]
     schema = pyarrow.schema(fields, {name: str(value) for name, value in table.part.attrs.items()})
     with parquet.ParquetWriter(path, schema) as writer:
         for frame in table.frames(CHUNK_CELLS):
-            writer.write_table(pyarrow.Table.from_pandas(frame.rename(columns=str), schema, preserve_index=False))
+            writer.write_table(
+                pyarrow.Table.from_pandas(frame.rename(columns=str), schema, preserve_index=False)
+            )
             done(len(frame))
 
 
-def _write_workbook(path: Path, tables: list[Table], source: object, done: Callable[[int], None]) -> None:
+def _write_workbook(
+    path: Path, tables: list[Table], source: object, done: Callable[[int], None]
+) -> None:
     import pandas as pd
 
-    # to memory: where a disk is full, zipfile of Python 3.13 would print a traceback besides the error
-    options = {"strings_to_formulas": False, "strings_to_urls": False, "nan_inf_to_errors": True, "in_memory": True}
+    # to memory: where a disk is full, zipfile of Python 3.13 would print a traceback besides the
+    # error
+    options = {
+        "strings_to_formulas": False,
+        "strings_to_urls": False,
+        "nan_inf_to_errors": True,
+        "in_memory": True,
+    }
     whole = io.BytesIO()
     with pd.ExcelWriter(whole, engine="xlsxwriter", engine_kwargs={"options": options}) as book:
         for table in tables:
             start = 0
             for frame in table.frames(CHUNK_CELLS):
-                for name in frame.select_dtypes("float32"):  # its shortest digits, not 0.10000000149
+                for name in frame.select_dtypes(
+                    "float32"
+                ):  # its shortest digits, not 0.10000000149
                     frame[name] = frame[name].astype(str).astype(float)
-                frame.to_excel(book, sheet_name=table.name[:31], startrow=start, header=start == 0, index=False)
+                frame.to_excel(
+                    book, sheet_name=table.name[:31], startrow=start, header=start == 0, index=False
+                )
                 start += len(frame) + (start == 0)
                 done(len(frame))
-        pd.DataFrame(_about(tables, source)).to_excel(book, sheet_name="about", header=False, index=False)
+        pd.DataFrame(_about(tables, source)).to_excel(
+            book, sheet_name="about", header=False, index=False
+        )
         book.sheets["about"].set_column(0, 1, 40)
     path.write_bytes(whole.getvalue())
 
@@ -293,13 +374,21 @@ def _about(tables: list[Table], source: object) -> list[tuple[str, str]]:
     results = [one for table in tables for one in table.part.data_vars.values()]
     rows = [("file", str(source)), ("table written by", f"slipsweep {__version__}")]
     rows += [(header(one), str(one.attrs.get("long_name", ""))) for one in results]
-    rows += [(str(one.attrs.get("long_name", name)), values_text(one)) for name, one in part.coords.items()]
+    rows += [
+        (str(one.attrs.get("long_name", name)), values_text(one))
+        for name, one in part.coords.items()
+    ]
     for table in tables:
         if "validity" in table.part:
             tally = tally_of(table.part[["validity"]])
             for flag, count in (tally.flags or {}).items():
                 share = f"{tally.share(count):.2%} of {tally.cells} cells"
-                rows.append((f"{int(flag)} {(flag.name or '').lower()}", f"{flag.kind}: {share}; {flag.text}"))
+                rows.append(
+                    (
+                        f"{int(flag)} {(flag.name or '').lower()}",
+                        f"{flag.kind}: {share}; {flag.text}",
+                    )
+                )
     for name, text in part.attrs.items():  # line by line: a cell does not hold a long text
         rows += [("" if at else str(name), line) for at, line in enumerate(str(text).splitlines())]
     return rows

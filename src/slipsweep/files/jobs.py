@@ -29,7 +29,9 @@ class Job:
     spec: SweepSpec
     plan: Plan
     title: str
-    options: Mapping[str, Any]  # what the results depend on further to the sweep file, by what users know it by
+    options: Mapping[
+        str, Any
+    ]  # what the results depend on further to the sweep file, by what users know it by
     floats: str = "float64"  # data type of floating-point results in the file
     attrs: Mapping[str, str] = field(default_factory=dict)  # further attributes of the file
 
@@ -46,7 +48,11 @@ class Job:
     @cached_property
     def identity(self) -> dict[str, Any]:
         """By what two runs know that they compute the same."""
-        found = {"version of slipsweep": __version__, "data type": self.floats, "sweep file": self.spec.text}
+        found = {
+            "version of slipsweep": __version__,
+            "data type": self.floats,
+            "sweep file": self.spec.text,
+        }
         if self.spec.recorded is not None:
             found["recorded motion"] = digest_of(self.spec.recorded)
         return {**found, **self.options}
@@ -58,9 +64,13 @@ class Job:
 
     def described(self, table: xr.Dataset, command: str) -> xr.Dataset:
         """Results with all that the file says, in the file's types."""
-        found = table.assign({name: table[name].astype(dtype, copy=False) for name, dtype in self.dtypes.items()})
+        found = table.assign(
+            {name: table[name].astype(dtype, copy=False) for name, dtype in self.dtypes.items()}
+        )
         if self.labels:
-            labels = xr.Variable("case", np.array(self.labels, object), {"long_name": "name of the case"})
+            labels = xr.Variable(
+                "case", np.array(self.labels, object), {"long_name": "name of the case"}
+            )
             found = found.assign_coords(label=labels)
         found = described(found, title=self.title, command=command, recorded=self.spec.recorded)
         return found.assign_attrs(self.attrs, **{RUN: self.digest})
@@ -70,23 +80,32 @@ class Job:
         import dask.array as da  # takes as long as xarray: only for runs in chunks
 
         template = self.plan.template()
-        zeros = {name: da.zeros(one.shape, dtype=one.dtype, chunks=-1) for name, one in template.data_vars.items()}
+        zeros = {
+            name: da.zeros(one.shape, dtype=one.dtype, chunks=-1)
+            for name, one in template.data_vars.items()
+        }
         return self.described(template.copy(data=zeros), command)
 
 
 def sweep_job(spec: SweepSpec) -> Job:
     """The job of `slipsweep run`: a sweep, or the statistics of samples."""
     options = {"solver": repr(spec.solver)}
-    return Job(spec, spec.plan(), spec.output.title, options, spec.output.dtype, {"sweep": spec.text})
+    return Job(
+        spec, spec.plan(), spec.output.title, options, spec.output.dtype, {"sweep": spec.text}
+    )
 
 
-def limit_job(spec: SweepSpec, displacement: float | list[float], maximum_amplitude: float | None = None) -> Job:
+def limit_job(
+    spec: SweepSpec, displacement: float | list[float], maximum_amplitude: float | None = None
+) -> Job:
     """The job of `slipsweep limit`: amplitudes (m/s²) that displacements (m, increasing) allow, over all other axes."""
     from slipsweep.studies.limits import plan_limits  # imports numba
 
     with named(spec.source):
         if spec.sampling is not None:
-            raise InputError("has uncertain inputs; limits are those of a sweep without [uncertainty]")
+            raise InputError(
+                "has uncertain inputs; limits are those of a sweep without [uncertainty]"
+            )
         plan = plan_limits(
             displacement,
             replace(spec.inputs, **dict.fromkeys(("displacement_amplitude", *STRENGTHS))),

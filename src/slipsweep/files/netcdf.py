@@ -19,7 +19,9 @@ from slipsweep.motion.suites import Suite
 WITH_MISSING = ("sliding_mode", *RECORD_COUNTS)
 
 
-def described(table: xr.Dataset, *, title: str, command: str, recorded: Record | Suite | None = None) -> xr.Dataset:
+def described(
+    table: xr.Dataset, *, title: str, command: str, recorded: Record | Suite | None = None
+) -> xr.Dataset:
     """Results as a file holds them: with the samples of the recorded motion, and global attributes."""
     found = table.copy()
     for name, one in dict(found.variables).items():
@@ -43,11 +45,15 @@ def fill_value(name: str, dtype: np.dtype[Any]) -> float | int | None:
 
 @contextmanager
 def new_file(
-    table: xr.Dataset, path: Path | str, lengths: Mapping[str, int] | None = None, compression: int = 0
+    table: xr.Dataset,
+    path: Path | str,
+    lengths: Mapping[str, int] | None = None,
+    compression: int = 0,
 ) -> Iterator[netCDF4.Dataset]:
     """Write what `described` gives; of variables that are dask arrays all but their values, which the caller writes.
 
-    With a level of compression by zlib, which every build of the library has, results are in chunks of these lengths.
+    With a level of compression by zlib, which every build of the library has, results are in chunks
+    of these lengths.
     """
     found = table.assign_attrs(_attributes(table.attrs))
     encoding: dict[Any, dict[str, Any]] = {}
@@ -59,7 +65,12 @@ def new_file(
             encoding[name] = {"dtype": "S1"}  # characters, since few programs read netCDF strings
         elif compression and is_result and one.dims:
             sizes = tuple((lengths or {}).get(str(dim), size) for dim, size in one.sizes.items())
-            encoding[name] |= {"zlib": True, "complevel": compression, "shuffle": True, "chunksizes": sizes}
+            encoding[name] |= {
+                "zlib": True,
+                "complevel": compression,
+                "shuffle": True,
+                "chunksizes": sizes,
+            }
     with netCDF4.Dataset(path, "w", format="NETCDF4") as file:
         file.set_fill_off()  # every value is written: to fill the file first would be to write it twice
         found.dump_to_store(xr.backends.NetCDF4DataStore(file), encoding=encoding)
@@ -72,8 +83,8 @@ def _attributes(attrs: Mapping[Any, Any], dtype: Any = np.int32) -> dict[Any, An
     found: dict[Any, Any] = {}
     for name, value in attrs.items():
         if isinstance(value, str):
-            # as bytes: the library writes text beyond ASCII as a netCDF string; bytes of a name that are no UTF-8 are
-            # spelled out
+            # as bytes: the library writes text beyond ASCII as a netCDF string; bytes of a name
+            # that are no UTF-8 are spelled out
             found[name] = value if value.isascii() else value.encode(errors="backslashreplace")
         elif name in ("flag_values", "flag_masks"):
             found[name] = np.asarray(value, dtype)

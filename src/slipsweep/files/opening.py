@@ -15,7 +15,13 @@ from slipsweep.grid.chunks import CHUNK_CELLS, chunk_lengths
 from slipsweep.model import variables as known
 
 #: All that a command of slipsweep writes, but for the samples of records.
-_RESULTS = {**known.RECORD_RESULTS, **known.LIMIT_RESULTS, **known.HISTORY, **known.STATISTICS, **known.RESULTS}
+_RESULTS = {
+    **known.RECORD_RESULTS,
+    **known.LIMIT_RESULTS,
+    **known.HISTORY,
+    **known.STATISTICS,
+    **known.RESULTS,
+}
 
 #: Columns of the table of motions: what stands above, by its coordinate.
 _MOTION_COLUMNS = {
@@ -47,8 +53,8 @@ def open_result(path: str | os.PathLike[str]) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        As `sweep` returns it: modes and counts are whole numbers, -1 where there is no value.  Its variables are dask
-        arrays; those of a store in the chunks that they were written in.
+        As `sweep` returns it: modes and counts are whole numbers, -1 where there is no value.  Its
+        variables are dask arrays; those of a store in the chunks that they were written in.
 
     Raises
     ------
@@ -69,16 +75,23 @@ def open_result(path: str | os.PathLike[str]) -> xr.Dataset:
     """
     table = read_result(path)
     stored = {
-        dim: length for one in table.values() for dim, length in (one.encoding.get("preferred_chunks") or {}).items()
+        dim: length
+        for one in table.values()
+        for dim, length in (one.encoding.get("preferred_chunks") or {}).items()
     }
     widest: Any = max((one.sizes for one in table.data_vars.values()), key=len, default={})
-    return table.chunk(stored or (chunk_lengths(widest, CHUNK_CELLS) if 0 not in widest.values() else {}))
+    return table.chunk(
+        stored or (chunk_lengths(widest, CHUNK_CELLS) if 0 not in widest.values() else {})
+    )
 
 
 def read_result(path: str | os.PathLike[str]) -> xr.Dataset:
     """Open a result without dask: values are read when they are asked for (InputError as `open_result`)."""
     table = _open(path)
-    if not str(table.attrs.get("source", "")).startswith("slipsweep ") and "sweep" not in table.attrs:
+    if (
+        not str(table.attrs.get("source", "")).startswith("slipsweep ")
+        and "sweep" not in table.attrs
+    ):
         raise InputError(f"{path}: not written by slipsweep, or its global attributes are lost")
     for name, one in dict(table.variables).items():
         for key in ("_FillValue", "missing_value"):  # how values are stored, not what they mean
@@ -86,7 +99,9 @@ def read_result(path: str | os.PathLike[str]) -> xr.Dataset:
         if one.dtype.kind in "UST":
             table[name] = table[name].astype(object)
         kind = np.dtype(known.RESULT_DTYPES.get(str(name), "f8"))
-        if kind.kind == "i" and one.dtype != kind:  # another program has made other numbers of codes
+        if (
+            kind.kind == "i" and one.dtype != kind
+        ):  # another program has made other numbers of codes
             missing = 0 if name == "validity" else -1
             table[name] = table[name].fillna(missing).astype(kind)
     return table
@@ -95,7 +110,9 @@ def read_result(path: str | os.PathLike[str]) -> xr.Dataset:
 def _open(path: str | os.PathLike[str]) -> xr.Dataset:
     """Open a netCDF file or a Zarr store, its values decoded but for codes."""
     # codes stay whole numbers: a fill value would make them floating-point ones
-    codes = {name: False for name, dtype in known.RESULT_DTYPES.items() if np.dtype(dtype).kind == "i"}
+    codes = {
+        name: False for name, dtype in known.RESULT_DTYPES.items() if np.dtype(dtype).kind == "i"
+    }
     how: dict[str, Any] = {"mask_and_scale": codes, "decode_times": False}
     place = place_of(path)
     if isinstance(place, str) or (place / "zarr.json").is_file():
@@ -103,11 +120,15 @@ def _open(path: str | os.PathLike[str]) -> xr.Dataset:
         try:
             table = xr.open_dataset(os.fspath(path), engine="zarr", consolidated=False, **how)
         except Exception as error:  # whatever the storage behind the address may raise
-            raise InputError(f"{path}: cannot be read as a Zarr store: {_first_line(error)}") from None
+            raise InputError(
+                f"{path}: cannot be read as a Zarr store: {_first_line(error)}"
+            ) from None
         if "unfinished" in table.attrs:
             raise InputError(f"{path}: is not finished; run its sweep again with --resume")
         # a store has no order: slipsweep's own
-        order = dict.fromkeys((*known.PARAMETERS, *known.MOTION_COORDINATES, *_RESULTS, *table.variables))
+        order = dict.fromkeys(
+            (*known.PARAMETERS, *known.MOTION_COORDINATES, *_RESULTS, *table.variables)
+        )
         return table[[name for name in order if name in table.variables]]
     if not place.exists():
         raise InputError(f"{path}: no such file")
@@ -119,7 +140,9 @@ def _open(path: str | os.PathLike[str]) -> xr.Dataset:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     except Exception as error:  # netCDF4 and xarray raise what they like on a damaged file
         made = "; of a sweep file slipsweep run makes one" if place.suffix == ".toml" else ""
-        raise InputError(f"{path}: not a netCDF file, or a damaged one ({_first_line(error)}){made}") from None
+        raise InputError(
+            f"{path}: not a netCDF file, or a damaged one ({_first_line(error)}){made}"
+        ) from None
 
 
 def check_zarr(path: object) -> None:
@@ -138,7 +161,11 @@ def result_names(table: xr.Dataset) -> list[str]:
     The samples of a record do not, nor do bounds of cells that another program added.
     """
     names = [str(name) for name in table.data_vars]
-    dims = {dim for name in [one for one in names if one in _RESULTS] or names for dim in table[name].dims}
+    dims = {
+        dim
+        for name in [one for one in names if one in _RESULTS] or names
+        for dim in table[name].dims
+    }
     dims -= {RECORD_DIM, SUITE_DIM}
     return [name for name in names if dims.issuperset(table[name].dims)]
 
@@ -177,8 +204,19 @@ def variable_texts(table: xr.Dataset) -> dict[str, str]:
 
 def motions_text(table: xr.Dataset) -> tuple[str, ...]:
     """The motions of a suite as a table, a header and a line each; empty without them."""
-    if "motion" not in table.coords or table["motion"].dims != ("motion",) or table["motion"].dtype.kind not in "OUST":
+    if (
+        "motion" not in table.coords
+        or table["motion"].dims != ("motion",)
+        or table["motion"].dtype.kind not in "OUST"
+    ):
         return ()
-    names = [name for name in _MOTION_COLUMNS if name in table.coords and table[name].dims == ("motion",)]
-    rows = table[names].to_dataframe()[names].rename(columns=_MOTION_COLUMNS).rename_axis(columns="motion", index=None)
+    names = [
+        name for name in _MOTION_COLUMNS if name in table.coords and table[name].dims == ("motion",)
+    ]
+    rows = (
+        table[names]
+        .to_dataframe()[names]
+        .rename(columns=_MOTION_COLUMNS)
+        .rename_axis(columns="motion", index=None)
+    )
     return tuple(rows.to_string(float_format="{:.4g}".format, na_rep="").splitlines())

@@ -27,12 +27,16 @@ def check_endings(paths: Iterable[Path | str], endings: Collection[str]) -> None
 
 
 def check_outputs(
-    output: Iterable[Path] | None, overwrite: bool, *, reads: Sequence[Path | int], endings: Collection[str] = ()
+    output: Iterable[Path] | None,
+    overwrite: bool,
+    *,
+    reads: Sequence[Path | int],
+    endings: Collection[str] = (),
 ) -> list[Path]:
     """The outputs of a command, none that cannot be written, may not be replaced, or is what it `reads` (InputError).
 
-    Every command that writes comes here before it computes anything.  What it reads are files, or 0, standard input.
-    Files are compared, not their names: a link is what it points to.
+    Every command that writes comes here before it computes anything.  What it reads are files, or
+    0, standard input. Files are compared, not their names: a link is what it points to.
     """
     paths = list(output or ())
     if endings:
@@ -40,9 +44,15 @@ def check_outputs(
     for path in paths:
         try:
             for read in reads:
-                if os.path.exists(path) and os.path.exists(read) and os.path.samestat(os.stat(path), os.stat(read)):
+                if (
+                    os.path.exists(path)
+                    and os.path.exists(read)
+                    and os.path.samestat(os.stat(path), os.stat(read))
+                ):
                     own = f"{read or 'standard input'}, which this command reads"
-                    raise InputError(f"{path}: writing it would replace {own}; give another name with -o")
+                    raise InputError(
+                        f"{path}: writing it would replace {own}; give another name with -o"
+                    )
             if not path.parent.is_dir():
                 raise InputError(f"{path}: the folder {path.parent} does not exist")
             if not os.access(path.parent, os.W_OK):
@@ -55,7 +65,9 @@ def check_outputs(
             raise InputError(f"{path}: cannot be written: {error.strerror}") from None
     for path, other in itertools.combinations(paths, 2):
         if path.absolute() == other.absolute():
-            raise InputError(f"{other}: is given twice as an output of this command; give each another name")
+            raise InputError(
+                f"{other}: is given twice as an output of this command; give each another name"
+            )
     return paths
 
 
@@ -63,7 +75,8 @@ def check_outputs(
 def complete_or_absent(path: Path, overwrite: bool) -> Iterator[Path]:
     """Yield a temporary name beside `path`; what is written there becomes `path` on success.
 
-    On any error or interruption `path` stays as it was.  RunError: it cannot be written, or another process made it.
+    On any error or interruption `path` stays as it was.  RunError: it cannot be written, or another
+    process made it.
     """
     # not made of the output's name, which may be as long as the system allows
     temporary = path.with_name(f".slipsweep-{os.getpid()}-{secrets.token_hex(4)}.tmp")

@@ -34,19 +34,24 @@ if TYPE_CHECKING:
     from distributed import Client
 
 #: Resident memory of a run, and of a worker of this machine, beside its chunks.
-_BASE_MEMORY, _WORKER_MEMORY = 430_000_000, 250_000_000
+_BASE_MEMORY = 430_000_000
+_WORKER_MEMORY = 250_000_000
 
-#: Chunks for each worker, so that all end at about the same time, and the least work of one, in cells of a sine.
-_CHUNKS_A_WORKER, _LEAST_WORK = 16, 500_000
+#: Chunks for each worker, so that all end at about the same time, and the least work of one, in
+#: cells of a sine.
+_CHUNKS_A_WORKER = 16
+_LEAST_WORK = 500_000
 
 #: Most processes that `--workers` starts on one machine.
 _MOST_WORKERS = 1024
 
-#: Chunks that are on the workers at a time, for each of their threads: one is solved while another comes back.
+#: Chunks that are on the workers at a time, for each of their threads: one is solved while another
+#: comes back.
 _AHEAD = 2
 
 #: Seconds between two looks for workers, and for which there may be none.
-_LOOK, _PATIENCE = 5.0, 60.0
+_LOOK = 5.0
+_PATIENCE = 60.0
 
 
 @dataclass(frozen=True)
@@ -72,21 +77,25 @@ def run(
 ) -> Report:
     """Solve a plan and write its results, complete or not at all.
 
-    `path` is a netCDF file, a Zarr store (a name that ends in .zarr) or the address of one; `command`, as typed, goes
-    into its `history`.  `overwrite` replaces it and the chunks of an interrupted run, `resume` goes on with these, and
-    leaves a complete output as it is.  The run takes so many bytes of `memory`, on so many `workers` of this machine or
-    on those of a `scheduler`.  `progress` is called with a number of cells just solved.
+    `path` is a netCDF file, a Zarr store (a name that ends in .zarr) or the address of one;
+    `command`, as typed, goes into its `history`.  `overwrite` replaces it and the chunks of an
+    interrupted run, `resume` goes on with these, and leaves a complete output as it is.  The run
+    takes so many bytes of `memory`, on so many `workers` of this machine or on those of a
+    `scheduler`.  `progress` is called with a number of cells just solved.
 
-    InputError: the output exists or cannot be written, the grid is too large for disk or memory, or there are chunks of
-    an interrupted run, of another sweep or version, or without `resume` and `overwrite`.  RunError: writing failed, or
-    another run is writing `path`; a note tells how many chunks are kept.
+    InputError: the output exists or cannot be written, the grid is too large for disk or memory, or
+    there are chunks of an interrupted run, of another sweep or version, or without `resume` and
+    `overwrite`.  RunError: writing failed, or another run is writing `path`; a note tells how many
+    chunks are kept.
     """
     if workers is not None and scheduler is not None:
         raise InputError("--workers, --scheduler: give one of them, not both")
     if workers is not None and not 1 <= workers <= _MOST_WORKERS:
         raise InputError(f"--workers = {workers}: must be from 1 to {_MOST_WORKERS}")
     if (workers or scheduler) and importlib.util.find_spec("distributed") is None:
-        raise InputError("--workers, --scheduler: need the package distributed: pip install 'slipsweep[cluster]'")
+        raise InputError(
+            "--workers, --scheduler: need the package distributed: pip install 'slipsweep[cluster]'"
+        )
     plan = job.plan
     if isinstance(path, Path):
         check_outputs([path], overwrite or resume, reads=job.spec.files)
@@ -101,7 +110,9 @@ def run(
         with named(job.spec.source):
             table = plan.solve(progress)
         with complete_or_absent(Path(path), overwrite) as temporary:
-            netcdf.write_table(job.described(table, command), temporary, job.spec.output.compression)
+            netcdf.write_table(
+                job.described(table, command), temporary, job.spec.output.compression
+            )
         return Report(path, tally_of(table))
     with chunks.begun(command, resume, overwrite), named(job.spec.source), ExitStack() as stack:
         kept = ((place, None) for place in chunks if place[0] in chunks.done)
@@ -143,14 +154,18 @@ def _most_cells(plan: Plan, memory: int | None, workers: int) -> float:
         return math.inf
     base = _BASE_MEMORY + plan.memory + workers * (_WORKER_MEMORY + plan.memory)
     results = sum(
-        one.dtype.itemsize * math.prod(size for dim, size in one.sizes.items() if dim not in plan.sizes)
+        one.dtype.itemsize
+        * math.prod(size for dim, size in one.sizes.items() if dim not in plan.sizes)
         for one in plan.template().data_vars.values()
     )
-    # in this process a chunk and its copies while it is written; a worker has one, and others are on their way
+    # in this process a chunk and its copies while it is written; a worker has one, and others are
+    # on their way
     cell = (2 + 3 * workers) * results + plan.cell_memory + 8
     most = (memory - base) // cell
     if most < 1000:
-        raise InputError(f"--memory = {size_text(memory)}: must be {size_text(1.01 * (base + 1000 * cell))} at least")
+        raise InputError(
+            f"--memory = {size_text(memory)}: must be {size_text(1.01 * (base + 1000 * cell))} at least"
+        )
     return most
 
 
@@ -188,7 +203,9 @@ def _connected(workers: int | None, scheduler: str | None) -> "Iterator[Client]"
         try:
             client = Client(scheduler, timeout=10.0)
         except (OSError, ValueError) as error:
-            raise RunError(f'--scheduler = "{scheduler}": no scheduler answers there: {error}') from None
+            raise RunError(
+                f'--scheduler = "{scheduler}": no scheduler answers there: {error}'
+            ) from None
         try:
             _check_versions(client, scheduler)
             yield client
@@ -207,21 +224,30 @@ def _check_versions(client: "Client", scheduler: str) -> None:
     try:
         client.wait_for_workers(1, timeout=_PATIENCE)
     except TimeoutError:
-        message = f"the scheduler at {scheduler} has no workers: start some with: dask worker {scheduler}"
+        message = (
+            f"the scheduler at {scheduler} has no workers: start some with: dask worker {scheduler}"
+        )
         raise RunError(message) from None
     # the lambda is sent as code: workers need not have this module
-    versions = client.run(lambda: importlib.import_module("slipsweep._version").__version__, on_error="return")
+    versions = client.run(
+        lambda: importlib.import_module("slipsweep._version").__version__, on_error="return"
+    )
     for worker, found in versions.items():
         if found != __version__:
-            raise RunError(f"slipsweep at the worker {worker}: {found}, in this process: {__version__}")
+            raise RunError(
+                f"slipsweep at the worker {worker}: {found}, in this process: {__version__}"
+            )
 
 
-def _computed(client: "Client", tasks: Iterable[tuple[Any, Callable[[], Any]]]) -> Iterator[tuple[Any, Any]]:
+def _computed(
+    client: "Client", tasks: Iterable[tuple[Any, Callable[[], Any]]]
+) -> Iterator[tuple[Any, Any]]:
     """Carry out tasks, each given with its name, and yield what they return as it comes back (RunError: none does)."""
     from distributed import CancelledError, KilledWorker, wait
 
     names: dict[Any, Any] = {}
-    left, seen = iter(tasks), time.monotonic()
+    left = iter(tasks)
+    seen = time.monotonic()
     while True:
         try:
             threads = sum(client.ncores().values())

@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.model.units import conversion, quantity
 
-#: What may be given for an axis: a number in its own unit, a text with another ("0.3g"), a label, or several of them.
+#: What may be given for an axis: a number in its own unit, a text with another ("0.3g"), a label,
+#: or several of them.
 At = float | str | Sequence[float | str]
 
-#: Numbers as near as this, of the largest on an axis, are the same: single precision keeps seven digits.
+#: Numbers as near as this, of the largest on an axis, are the same: single precision keeps seven
+#: digits.
 _SAME = 1e-7
 
 #: Fewest digits that a text is taken to have: 5 stands for 5.000.
@@ -43,13 +45,17 @@ def axis_labels(data: xr.Dataset, dim: str) -> list[str]:
 def axis_numbers(data: xr.Dataset, dim: str) -> np.ndarray:
     """The numbers along a dimension; 1, 2, ... where it has none."""
     there = dim in data.variables and data[dim].dtype.kind not in "OUST"
-    return np.asarray(data[dim].values, np.float64) if there else np.arange(1.0, 1.0 + data.sizes[dim])
+    return (
+        np.asarray(data[dim].values, np.float64) if there else np.arange(1.0, 1.0 + data.sizes[dim])
+    )
 
 
 def axis_values(data: xr.Dataset, dim: str) -> list[Any]:
     """The values along a dimension, or their labels; of one without either the numbers from 1."""
     labels = axis_labels(data, dim)
-    return labels or (data[dim].values.tolist() if dim in data.coords else list(range(1, data.sizes[dim] + 1)))
+    return labels or (
+        data[dim].values.tolist() if dim in data.coords else list(range(1, data.sizes[dim] + 1))
+    )
 
 
 def units_text(one: xr.DataArray, before: str = " ") -> str:
@@ -61,12 +67,16 @@ def units_text(one: xr.DataArray, before: str = " ") -> str:
 def find(data: xr.Dataset, at: Mapping[str, At], where: str = "result") -> dict[str, list[Place]]:
     """Find values on the axes of a result, called `where` in errors.
 
-    A text is equal to a value of the result in the digits that it has, in its own unit: what a message or a caption
-    prints can be typed.  It may hold several values, with commas; labels, or their numbers from 1.  A parameter that is
-    one number for the whole result may be named too, with that number; it is not among what is returned.  InputError:
-    there is no such axis, or a value lies outside of it.
+    A text is equal to a value of the result in the digits that it has, in its own unit: what a
+    message or a caption prints can be typed.  It may hold several values, with commas; labels, or
+    their numbers from 1.  A parameter that is one number for the whole result may be named too,
+    with that number; it is not among what is returned.  InputError: there is no such axis, or a
+    value lies outside of it.
     """
-    known = [*map(str, data.sizes), *(str(name) for name, one in data.coords.items() if one.ndim == 0)]
+    known = [
+        *map(str, data.sizes),
+        *(str(name) for name, one in data.coords.items() if one.ndim == 0),
+    ]
     found = {}
     for name, cut in at.items():
         if name not in known:
@@ -75,7 +85,9 @@ def find(data: xr.Dataset, at: Mapping[str, At], where: str = "result") -> dict[
         texts: Any = [cut] if cut in labels or np.ndim(cut) == 0 else cut
         if isinstance(cut, str) and cut not in labels:
             texts = [one.strip() for one in cut.split(",")]
-        places = list(dict.fromkeys(_place(data, f"{where}: {name}", name, one, labels) for one in texts))
+        places = list(
+            dict.fromkeys(_place(data, f"{where}: {name}", name, one, labels) for one in texts)
+        )
         if name in data.sizes:
             found[name] = places
         elif any(place.index is None for place in places):
@@ -91,7 +103,8 @@ def own_names(data: xr.Dataset, at: Mapping[str, At]) -> dict[str, At]:
         own = "yield_coefficient" if name == "ky" else name
         if own == "mu_s" and own in data.coords and data[own].dims == ("phi",):
             places = find(data.swap_dims(phi=own), {own: cut})[own]
-            own, cut = "phi", ",".join(f"{math.degrees(math.atan(one.value)):.10g}" for one in places)
+            own = "phi"
+            cut = ",".join(f"{math.degrees(math.atan(one.value)):.10g}" for one in places)
         found[own] = cut
     return found
 
@@ -101,23 +114,32 @@ def places_at(
 ) -> dict[str, NDArray[np.intp]]:
     """Indices of values on some axes of a result, of which `dims` may be cut, for `Dataset.isel`.
 
-    InputError: as `find`, or a value lies between those of the result; the message names its neighbours.
+    InputError: as `find`, or a value lies between those of the result; the message names its
+    neighbours.
     """
     at = own_names(data, at)
     for name in at:
         if name in data.sizes and name not in dims:
-            raise InputError(f"{source}: {name} = {at[name]}: cannot be selected here; {did_you_mean(name, [*dims])}")
+            raise InputError(
+                f"{source}: {name} = {at[name]}: cannot be selected here; {did_you_mean(name, [*dims])}"
+            )
     places = find(data, at, str(source))
     for name, found in places.items():
         for place in found:
             if place.index is None:
                 raise InputError(f"{source}: {between(data, name, place.value)}")
-    return {name: np.array([place.index for place in found], np.intp) for name, found in places.items()}
+    return {
+        name: np.array([place.index for place in found], np.intp) for name, found in places.items()
+    }
 
 
-def selected(data: xr.Dataset, source: object, at: Mapping[str, At], kept: Collection[str]) -> xr.Dataset:
+def selected(
+    data: xr.Dataset, source: object, at: Mapping[str, At], kept: Collection[str]
+) -> xr.Dataset:
     """A result at values of its axes, but for those that are `kept` whole; as `places_at`."""
-    return data.isel(places_at(data, source, at, [str(dim) for dim in data.sizes if dim not in kept]))
+    return data.isel(
+        places_at(data, source, at, [str(dim) for dim in data.sizes if dim not in kept])
+    )
 
 
 def between(data: xr.Dataset, name: str, value: float) -> str:
@@ -151,8 +173,11 @@ def _place(data: xr.Dataset, key: str, name: str, given: float | str, labels: li
     nearest = int(np.argmin(np.abs(values - number)))
     if abs(values[nearest] - number) <= slack:
         return Place(float(values[nearest]), nearest)
-    low, high = values.min(), values.max()
+    low = values.min()
+    high = values.max()
     if not low <= number <= high:
         there = f"{low:.6g} to {high:.6g}" if values.size > 1 else f"{low:.6g}"
-        raise InputError(f"{key} = {text}: outside the range of the result, {there}{units_text(data[name])}")
+        raise InputError(
+            f"{key} = {text}: outside the range of the result, {there}{units_text(data[name])}"
+        )
     return Place(number, None)

@@ -1,7 +1,8 @@
 """Sweep files: TOML text in, the arguments of `slipsweep.sweep` out.
 
-Here keys are checked, axes become arrays in their own units, and what two tables say of one thing is refused.  Those
-that take the values know what they may be.  A refusal is an `InputError`, ``FILE: key = VALUE: what is allowed``.
+Here keys are checked, axes become arrays in their own units, and what two tables say of one thing
+is refused.  Those that take the values know what they may be.  A refusal is an `InputError`,
+``FILE: key = VALUE: what is allowed``.
 """
 
 import tomllib
@@ -31,14 +32,25 @@ _INPUTS = tuple(name for name in variables.PARAMETERS if name != "polarity")
 
 #: Parameters that [model] may give as one number for the whole sweep.
 _MODEL_PARAMETERS = (
-    "yield_acceleration", "yield_coefficient", "decay_rate", "delta_mu", "minimum_friction", "structure_frequency",
-)  # fmt: skip
+    "yield_acceleration",
+    "yield_coefficient",
+    "decay_rate",
+    "delta_mu",
+    "minimum_friction",
+    "structure_frequency",
+)
 
 #: Tables that are a choice with its options.
 _FAMILIES: tuple[choices.Family[Any], ...] = (options.MODELS, WAVEFORMS, options.SOLVERS)
 
 #: Keys of [excitation] that go with recorded motions.
-_RECORD_KEYS = ("record", "records", "pairs", *(one.name for one in choices.declared(reading.Reading)), "polarity")
+_RECORD_KEYS = (
+    "record",
+    "records",
+    "pairs",
+    *(one.name for one in choices.declared(reading.Reading)),
+    "polarity",
+)
 
 
 @dataclass(frozen=True)
@@ -52,10 +64,18 @@ class Output:
     compression: int = 0
 
 
-#: The keys of each table, and their defaults where these are not declared elsewhere; None: there is none.
+#: The keys of each table, and their defaults where these are not declared elsewhere; None: there is
+#: none.
 KEYS: dict[str, dict[str, Any]] = {
     "axes": dict.fromkeys(_INPUTS),
-    "axes.NAME": {"values": None, "start": None, "stop": None, "num": None, "spacing": "linear", "units": None},
+    "axes.NAME": {
+        "values": None,
+        "start": None,
+        "stop": None,
+        "num": None,
+        "spacing": "linear",
+        "units": None,
+    },
     "cases": dict.fromkeys(("label", *_INPUTS)),
     **{one.keyword: {one.key: one.default} | dict.fromkeys(one.options) for one in _FAMILIES},
     "output": asdict(Output()) | {"variables": list(variables.DEFAULT_RESULTS)},
@@ -100,7 +120,11 @@ class SweepSpec:
 
     def plan(self) -> "Plan":
         """Return what the sweep file describes: a sweep, or the statistics of samples (InputError as `sweep`)."""
-        chosen: dict[str, Any] = {"excitation": self.excitation, "model": self.model, "solver": self.solver}
+        chosen: dict[str, Any] = {
+            "excitation": self.excitation,
+            "model": self.model,
+            "solver": self.solver,
+        }
         # these import numba, and scipy: not for sweeps that are only looked at
         with named(self.source):
             if self.sampling is None:
@@ -115,8 +139,9 @@ class SweepSpec:
 def load(path: str | Path) -> SweepSpec:
     """Read and check a sweep file (TOML), or a result of `slipsweep run`: then the sweep it was made from.
 
-    A sweep file may be a pipe, or ``-`` for standard input; the record that it names is then looked for in the folder
-    that the command runs in.  InputError: the file cannot be read, or something in it is not allowed.
+    A sweep file may be a pipe, or ``-`` for standard input; the record that it names is then looked
+    for in the folder that the command runs in.  InputError: the file cannot be read, or something
+    in it is not allowed.
     """
     path = Path(path)
     if (path / "zarr.json").is_file():
@@ -132,7 +157,11 @@ def load(path: str | Path) -> SweepSpec:
         raise InputError(f"{path}: not a sweep file: it is not UTF-8 text") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
-    sweep = _load_result(path) if is_netcdf else parse(text, str(path), Path() if is_stream(path) else path.parent)
+    sweep = (
+        _load_result(path)
+        if is_netcdf
+        else parse(text, str(path), Path() if is_stream(path) else path.parent)
+    )
     return replace(sweep, files=(read, *sweep.files))
 
 
@@ -143,30 +172,44 @@ def is_stream(path: Path) -> bool:
 
 def _load_result(path: Path) -> SweepSpec:
     with opening.read_result(path) as file:
-        attributes, recorded = file.attrs, motions.read_embedded(file, path)
+        attributes = file.attrs
+        recorded = motions.read_embedded(file, path)
     if "sweep" not in attributes:
-        raise InputError(f'{path}: no attribute "sweep": only a result of "slipsweep run" can be repeated')
+        raise InputError(
+            f'{path}: no attribute "sweep": only a result of "slipsweep run" can be repeated'
+        )
     spec = parse(str(attributes["sweep"]), str(path), path.parent, recorded)
     # the solver that ran: it may have been chosen on the command line, over the sweep file's
     with named(str(path)):
-        return replace(spec, solver=options.SOLVERS.from_attributes(attributes)) if "solver" in attributes else spec
+        return (
+            replace(spec, solver=options.SOLVERS.from_attributes(attributes))
+            if "solver" in attributes
+            else spec
+        )
 
 
-def parse(text: str, source: str, folder: Path | None = None, recorded: Recorded | None = None) -> SweepSpec:
+def parse(
+    text: str, source: str, folder: Path | None = None, recorded: Recorded | None = None
+) -> SweepSpec:
     """Check the text of a sweep file, called `source` in errors; see `load`.
 
-    Its records are looked for in `folder`, by default the one that the command runs in; or they are those that a result
-    has kept.
+    Its records are looked for in `folder`, by default the one that the command runs in; or they are
+    those that a result has kept.
     """
     try:
         content = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # also of integers too long to convert, and of deep nesting
+    except (
+        ValueError,
+        RecursionError,
+    ) as error:  # also of integers too long to convert, and of deep nesting
         raise InputError(f"{source}: not valid TOML: {error}") from None
     with named(source):
         names = [name for name in KEYS if name not in ("axes.NAME", "cases")]
         tables = {name: dict(_known(name, content.get(name, {}), KEYS[name])) for name in names}
         _known("", content, (*names, "cases"))
-        numbers = {name: tables["model"].pop(name) for name in _MODEL_PARAMETERS if name in tables["model"]}
+        numbers = {
+            name: tables["model"].pop(name) for name in _MODEL_PARAMETERS if name in tables["model"]
+        }
         if numbers.get("yield_acceleration") == "coulomb":
             del numbers["yield_acceleration"]
         model = _chosen(options.MODELS, tables["model"])
@@ -181,12 +224,17 @@ def parse(text: str, source: str, folder: Path | None = None, recorded: Recorded
                 files = tuple(Path(one.name) for one in parts)
         else:
             for other in (one for one in tables["excitation"] if one in _RECORD_KEYS):
-                raise InputError(f"excitation.{other}: only beside excitation.record, the file of a recorded motion")
+                raise InputError(
+                    f"excitation.{other}: only beside excitation.record, the file of a recorded motion"
+                )
             motion = _chosen(WAVEFORMS, tables["excitation"])
         sampling = _sampling(tables["uncertainty"], model.g) if "uncertainty" in content else None
         labels = tuple(str(row.get("label", number)) for number, row in enumerate(rows, 1))
-        solver, output = _chosen(options.SOLVERS, tables["solver"]), _output(tables["output"], sampling is not None)
-        return SweepSpec(source, text, Inputs(**given), labels, model, motion, solver, output, sampling, files)
+        solver = _chosen(options.SOLVERS, tables["solver"])
+        output = _output(tables["output"], sampling is not None)
+        return SweepSpec(
+            source, text, Inputs(**given), labels, model, motion, solver, output, sampling, files
+        )
 
 
 @contextmanager
@@ -205,21 +253,29 @@ def _known(key: str, table: Any, keys: Collection[str]) -> _Table:
         raise InputError(f"{key} = {units.show(table)}: must be a table")
     for name in table:
         if name not in keys:
-            raise InputError(f"{key}{'.' if key else ''}{name}: unknown key; {did_you_mean(name, tuple(keys))}")
+            raise InputError(
+                f"{key}{'.' if key else ''}{name}: unknown key; {did_you_mean(name, tuple(keys))}"
+            )
     return table
 
 
 def _chosen(family: choices.Family[Any], table: _Table) -> Any:
     """The choice that a table names, with its options."""
     given = {name: value for name, value in table.items() if name != family.key}
-    return family.made(table.get(family.key, family.default), given, lambda text: f"{family.keyword}.{text}")
+    return family.made(
+        table.get(family.key, family.default), given, lambda text: f"{family.keyword}.{text}"
+    )
 
 
 def _sampling(table: dict[str, Any], g: float) -> "Sampling":
     from slipsweep.studies.sampling import Sampling  # imports scipy: only for sweeps that need it
 
     drawn = {name: value for name, value in table.items() if name in variables.DRAWN}
-    settings = {name: value for name, value in (KEYS["uncertainty"] | table).items() if name not in variables.DRAWN}
+    settings = {
+        name: value
+        for name, value in (KEYS["uncertainty"] | table).items()
+        if name not in variables.DRAWN
+    }
     return Sampling(drawn, **settings, g=g, keys="uncertainty.")
 
 
@@ -228,7 +284,10 @@ def _inputs(axes: _Table, rows: list[dict[str, Any]], numbers: _Table, g: float)
     columns = [name for name in rows[0] if name != "label"] if rows else []
     given: dict[str, Any] = {name: _axis(name, axis, g) for name, axis in axes.items()}
     cases = {name: xr.DataArray([row[name] for row in rows], dims="case") for name in columns}
-    model = {name: parameters.check_single(name, value, f"model.{name}") for name, value in numbers.items()}
+    model = {
+        name: parameters.check_single(name, value, f"model.{name}")
+        for name, value in numbers.items()
+    }
     for table, values in (("cases", cases), ("model", model)):
         for name in given.keys() & values.keys():
             raise InputError(f"{table}.{name}: given twice: give it in one table")
@@ -236,28 +295,38 @@ def _inputs(axes: _Table, rows: list[dict[str, Any]], numbers: _Table, g: float)
     return given
 
 
-def _recorded_motion(key: str, tables: Mapping[str, _Table], folder: Path, recorded: Recorded | None) -> Recorded:
+def _recorded_motion(
+    key: str, tables: Mapping[str, _Table], folder: Path, recorded: Recorded | None
+) -> Recorded:
     """The records in files that [excitation] names, or those that a result has kept."""
     table = tables["excitation"]
     others = [f"excitation.{one}" for one in table if one not in _RECORD_KEYS]
     for other in (*others, *(f"solver.{one}" for one in tables["solver"])):
-        raise InputError(f"{other}: not allowed with excitation.{key}, to which the response is exact")
+        raise InputError(
+            f"{other}: not allowed with excitation.{key}, to which the response is exact"
+        )
     if {"record", "records"} <= {*table}:
         raise InputError("excitation.records: not allowed beside record: give one of them")
     if key == "record" and "pairs" in table:
         raise InputError("excitation.pairs: only beside excitation.records, the files of a suite")
     if key == "record" and not isinstance(table["record"], str):
-        raise InputError(f"excitation.record = {units.show(table['record'])}: must be the name of a file")
+        raise InputError(
+            f"excitation.record = {units.show(table['record'])}: must be the name of a file"
+        )
     if recorded is not None:
         return recorded
-    given = {name: value for name, value in table.items() if name not in ("record", "records", "pairs")}
+    given = {
+        name: value for name, value in table.items() if name not in ("record", "records", "pairs")
+    }
     try:
         how = reading.Reading(**given)
         if key == "record":
             return records.read_record(folder / table["record"], **how.options)
         return suites.suite_in(folder, table["records"], table.get("pairs"), how)
     except InputError as error:
-        message = str(error).replace("paths", key, 1) if str(error).startswith("paths") else str(error)
+        message = (
+            str(error).replace("paths", key, 1) if str(error).startswith("paths") else str(error)
+        )
         names_key = message.startswith((key, *_RECORD_KEYS))
         error.args = (f"excitation.{message}" if names_key else f"excitation.{key}: {message}",)
         raise
@@ -274,8 +343,13 @@ def _cases(rows: Any) -> list[dict[str, Any]]:
     for number, row in enumerate(rows, 1):
         key = f"cases[row {number}]"
         for name in {*columns} ^ {*_known(key, row, KEYS["cases"])} - {"label"}:
-            raise InputError(f"{key}.{name}: every row must give what row 1 gives: {', '.join(columns)}")
-        found.append(row | {name: parameters.check_single(name, row[name], f"{key}.{name}") for name in columns})
+            raise InputError(
+                f"{key}.{name}: every row must give what row 1 gives: {', '.join(columns)}"
+            )
+        found.append(
+            row
+            | {name: parameters.check_single(name, row[name], f"{key}.{name}") for name in columns}
+        )
     return found
 
 
@@ -291,33 +365,49 @@ def _axis(name: str, given: Any, g: float) -> NDArray[np.float64]:
         key = f"{key}.values"
         numbers = parameters.check_numbers(key, table["values"])
         if numbers.ndim != 1 or not numbers.size:
-            raise InputError(f"{key} = {units.show(table['values'])}: must be a list of one number at least")
+            raise InputError(
+                f"{key} = {units.show(table['values'])}: must be a list of one number at least"
+            )
     else:
         for part in ("start", "stop", "num"):
             if part not in table:
-                raise InputError(f"{key}.{part}: missing: an axis is values = [...], or start, stop and num")
-        start, stop = (parameters.check_finite(f"{key}.{part}", table[part]) for part in ("start", "stop"))
+                raise InputError(
+                    f"{key}.{part}: missing: an axis is values = [...], or start, stop and num"
+                )
+        start, stop = (
+            parameters.check_finite(f"{key}.{part}", table[part]) for part in ("start", "stop")
+        )
         num = parameters.check_whole(f"{key}.num", table["num"], 2, _MOST_POINTS)
-        spacing = parameters.check_choice(f"{key}.spacing", table.get("spacing", "linear"), ("linear", "log"))
+        spacing = parameters.check_choice(
+            f"{key}.spacing", table.get("spacing", "linear"), ("linear", "log")
+        )
         if stop <= start:
             raise InputError(f"{key}.stop = {stop}: must be greater than start, {start}")
         if spacing == "log" and start <= 0.0:
             raise InputError(f'{key}.start = {start}: must be positive with spacing = "log"')
-        numbers = np.linspace(start, stop, num) if spacing == "linear" else np.geomspace(start, stop, num)
+        numbers = (
+            np.linspace(start, stop, num) if spacing == "linear" else np.geomspace(start, stop, num)
+        )
     unit = table.get("units")
     if unit is not None and not isinstance(unit, str):
         raise InputError(f"axes.{name}.units = {units.show(unit)}: must be a text")
-    values = numbers * units.conversion(f"axes.{name}.units", variables.PARAMETERS[name]["units"], unit, g)
+    values = numbers * units.conversion(
+        f"axes.{name}.units", variables.PARAMETERS[name]["units"], unit, g
+    )
     parameters.check_values(name, values, key)
     for at in np.flatnonzero(np.diff(values) <= 0.0):
-        raise InputError(f"{key}: {numbers[at + 1]} after {numbers[at]}: must increase from one value to the next")
+        raise InputError(
+            f"{key}: {numbers[at + 1]} after {numbers[at]}: must increase from one value to the next"
+        )
     return values
 
 
 def _output(table: _Table, has_statistics: bool) -> Output:
     """The table [output]; which variables there are depends on the kind of sweep, whose plan checks them."""
     if has_statistics and "variables" in table:
-        raise InputError("output.variables: not allowed beside [uncertainty], which has statistics as its results")
+        raise InputError(
+            "output.variables: not allowed beside [uncertainty], which has statistics as its results"
+        )
     for name in ("path", "title"):
         if not isinstance(table.get(name, ""), str):
             raise InputError(f"output.{name} = {units.show(table[name])}: must be a text")

@@ -1,12 +1,13 @@
 """Where a chunk is written, and how a run goes on after an interruption.
 
-Each chunk of a run is written once, to its place in ``OUT.nc.part/result.nc`` or ``OUT.zarr.part/store``.  When it is
-there (in a netCDF file: on the disk itself), an empty file ``000012.chunk`` beside it says so; `identity.json` says
-what the chunks are of, and their lengths.
+Each chunk of a run is written once, to its place in ``OUT.nc.part/result.nc`` or
+``OUT.zarr.part/store``.  When it is there (in a netCDF file: on the disk itself), an empty file
+``000012.chunk`` beside it says so; `identity.json` says what the chunks are of, and their lengths.
 
-The netCDF file is made with all but the values of its results.  Chunks change nothing else in it, so that it can be
-read whenever a run ends, and what is marked is there.  A compressed file is made of it at the end.
-A store has the attribute `unfinished` meanwhile; one at an address (``s3://…``) is written where it is.
+The netCDF file is made with all but the values of its results.  Chunks change nothing else in it,
+so that it can be read whenever a run ends, and what is marked is there.  A compressed file is made
+of it at the end. A store has the attribute `unfinished` meanwhile; one at an address (``s3://…``)
+is written where it is.
 """
 
 import json
@@ -56,14 +57,21 @@ class Chunks:
     lengths: dict[str, int]  # of a chunk, along each dimension of the grid
     most: float = math.inf  # cells of a chunk that the memory asked for holds
     done: set[int] = field(default_factory=set)  # what an interrupted run has left
-    name: ClassVar[str] = "result.nc"  # of the file or store that chunks are written to, within `place`
+    name: ClassVar[str] = (
+        "result.nc"  # of the file or store that chunks are written to, within `place`
+    )
 
     def __post_init__(self) -> None:
-        self.place = f"{os.fspath(self.path).rstrip('/')}.part"  # what an interrupted run leaves: a folder
+        self.place = (
+            f"{os.fspath(self.path).rstrip('/')}.part"  # what an interrupted run leaves: a folder
+        )
         self.target = self.path if isinstance(self.path, str) else f"{self.place}/{self.name}"
         try:
             self._files, self._folder = url_to_fs(self.place)
-        except (ImportError, ValueError) as error:  # the package that a protocol needs, or no protocol
+        except (
+            ImportError,
+            ValueError,
+        ) as error:  # the package that a protocol needs, or no protocol
             raise InputError(f"{self.path}: {error}") from None
 
     def __iter__(self) -> Iterator[tuple[int, Chunk]]:
@@ -75,10 +83,12 @@ class Chunks:
     def begun(self, command: str, resume: bool, overwrite: bool) -> Iterator[None]:
         """Take over the chunks of an interrupted run, or begin anew, while no other run writes this output.
 
-        InputError: neither may be done.  RunError: another run is writing it, or writing failed.  A note to any error
-        says how many chunks are kept.
+        InputError: neither may be done.  RunError: another run is writing it, or writing failed.  A
+        note to any error says how many chunks are kept.
         """
-        with self._locked() if isinstance(self.path, Path) else nullcontext():  # an address has no lock
+        with (
+            self._locked() if isinstance(self.path, Path) else nullcontext()
+        ):  # an address has no lock
             self._begin(command, resume, overwrite)
             try:
                 with writing(self.path):
@@ -115,16 +125,21 @@ class Chunks:
         with writing(self.path), suppress(FileNotFoundError, ValueError):
             state = json.loads(self._files.cat_file(f"{self._folder}/identity.json"))
         if state is None and not overwrite and self._finished():
-            raise InputError(f"{self.place}: has chunks that nothing identifies; --overwrite starts again without them")
+            raise InputError(
+                f"{self.place}: has chunks that nothing identifies; --overwrite starts again without them"
+            )
         if state is None or overwrite:
             self._clear()
             if isinstance(self.path, Path):
-                needed, free = self.job.outline("").nbytes, shutil.disk_usage(self.path.parent).free
+                needed = self.job.outline("").nbytes
+                free = shutil.disk_usage(self.path.parent).free
                 # a store is compressed, nobody knows how much
                 if needed * (0.05 if self.path.suffix == ".zarr" else 1.0) > free:
                     sizes = f"takes {size_text(needed)}, but {size_text(free)} are free on the disk"
                     raise InputError(f"{self.path}: {sizes}")
-            if not overwrite and self._files.exists(f"{self.place.removesuffix('.part')}/zarr.json"):
+            if not overwrite and self._files.exists(
+                f"{self.place.removesuffix('.part')}/zarr.json"
+            ):
                 raise InputError(EXISTS.format(path=self.path))
             with writing(self.path):
                 self._files.makedirs(self._folder, exist_ok=True)
@@ -132,7 +147,11 @@ class Chunks:
                 state = {"identity": self.job.identity, "lengths": self.lengths}
                 self._files.pipe_file(f"{self._folder}/identity.json", json.dumps(state).encode())
             return
-        others = [name for name, value in self.job.identity.items() if state["identity"].get(name) != value]
+        others = [
+            name
+            for name, value in self.job.identity.items()
+            if state["identity"].get(name) != value
+        ]
         fault = ""
         if not resume:
             fault = "has chunks of an interrupted run; give --resume to go on with them"
@@ -157,7 +176,11 @@ class Chunks:
 
     def _left(self) -> list[str]:
         self._files.invalidate_cache()  # workers write there as well
-        return list(self._files.ls(self._folder, detail=False)) if self._files.exists(self._folder) else []
+        return (
+            list(self._files.ls(self._folder, detail=False))
+            if self._files.exists(self._folder)
+            else []
+        )
 
     def make(self, command: str) -> None:
         """Make the file or store that chunks are written to."""
@@ -210,7 +233,9 @@ def _region(chunk: Chunk, result: netCDF4.Variable) -> Any:
 def _solved(plan: Plan, dtypes: Mapping[str, np.dtype[Any]], chunk: Chunk) -> xr.Dataset:
     """The results of a chunk in the types of the file, without coordinates."""
     table = plan.part(chunk).solve()
-    return xr.Dataset({name: table[name].variable.astype(dtype, copy=False) for name, dtype in dtypes.items()})
+    return xr.Dataset(
+        {name: table[name].variable.astype(dtype, copy=False) for name, dtype in dtypes.items()}
+    )
 
 
 def _mark(place: str, number: int) -> None:
@@ -237,12 +262,23 @@ class ZarrChunks(Chunks):
             inner = list(shard)
             for axis, length in enumerate(shard):
                 if (cells := math.prod(inner)) > _ZARR_CELLS:
-                    parts = (one for one in range(1, length + 1) if length % one == 0)  # a shard holds whole chunks
-                    inner[axis] = length // min(parts, key=lambda count: abs(math.log(cells / count / _ZARR_CELLS)))
+                    parts = (
+                        one for one in range(1, length + 1) if length % one == 0
+                    )  # a shard holds whole chunks
+                    inner[axis] = length // min(
+                        parts, key=lambda count: abs(math.log(cells / count / _ZARR_CELLS))
+                    )
             encoding[name] = {"_FillValue": netcdf.fill_value(name, dtype)}
             encoding[name] |= {"chunks": inner, "shards": shard} if shard else {}
             encoding[name] |= {"compressors": [ZstdCodec(level=level)]} if level else {}
-        table.to_zarr(self.target, mode="w", compute=False, encoding=encoding, zarr_format=3, consolidated=False)
+        table.to_zarr(
+            self.target,
+            mode="w",
+            compute=False,
+            encoding=encoding,
+            zarr_format=3,
+            consolidated=False,
+        )
 
     def task(self, number: int, chunk: Chunk) -> Callable[[], None]:
         solve = partial(_solved, self.job.plan, self.job.dtypes, chunk)
@@ -255,10 +291,14 @@ class ZarrChunks(Chunks):
         return self.target
 
 
-def _write_region(solve: Callable[[], xr.Dataset], chunk: Chunk, store: str, place: str, number: int) -> None:
+def _write_region(
+    solve: Callable[[], xr.Dataset], chunk: Chunk, store: str, place: str, number: int
+) -> None:
     """Compute a chunk and write it to its region of a Zarr store, then its mark."""
     results = solve()
-    whole = [name for name, one in results.items() if chunk.keys().isdisjoint(one.dims)]  # no region
+    whole = [
+        name for name, one in results.items() if chunk.keys().isdisjoint(one.dims)
+    ]  # no region
     for part in filter(None, (results.drop_vars(whole), results[whole])):
         region: Any = {dim: chunk[str(dim)] for dim in part.dims if dim in chunk} or None
         part.to_zarr(store, mode="r+", region=region, zarr_format=3, consolidated=False)

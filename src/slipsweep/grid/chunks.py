@@ -14,14 +14,18 @@ Chunk: TypeAlias = dict[str, slice]
 CHUNK_CELLS = 4_000_000
 
 
-def chunk_lengths(shape: Mapping[str, int], most: int, together: Collection[str] = ()) -> dict[str, int]:
+def chunk_lengths(
+    shape: Mapping[str, int], most: int, together: Collection[str] = ()
+) -> dict[str, int]:
     """Return the chunk of a grid: at most `most` cells, whole along the last dimensions as far as they allow.
 
-    Its cells then follow one another in the file.  Among the last dimensions is the frequency, of which a
-    whole axis costs `sweep` hardly more than one value.  Dimensions `together` are cut only where no other is left.
+    Its cells then follow one another in the file.  Among the last dimensions is the frequency, of
+    which a whole axis costs `sweep` hardly more than one value.  Dimensions `together` are cut only
+    where no other is left.
     """
     lengths: dict[str, int] = {}
-    order, cells = sorted(shape, key=lambda dim: dim in together), 1
+    order = sorted(shape, key=lambda dim: dim in together)
+    cells = 1
     for dim in reversed(order):
         # equal shares rather than full chunks and a remnant
         pieces = math.ceil(shape[dim] / max(1, most // cells))
@@ -30,18 +34,26 @@ def chunk_lengths(shape: Mapping[str, int], most: int, together: Collection[str]
     return {dim: lengths[dim] for dim in shape}
 
 
-def grid_chunks(shape: Mapping[str, int], most: int, together: Collection[str] = ()) -> Iterator[Chunk]:
+def grid_chunks(
+    shape: Mapping[str, int], most: int, together: Collection[str] = ()
+) -> Iterator[Chunk]:
     """Cut a grid into chunks as `chunk_lengths` says, in the order of the file; a grid without cells has none."""
     if 0 not in shape.values():
         lengths = chunk_lengths(shape, most, together)
         for corner in itertools.product(*(range(0, shape[dim], lengths[dim]) for dim in shape)):
             starts = dict(zip(shape, corner, strict=True))
-            yield {dim: slice(start, min(start + lengths[dim], shape[dim])) for dim, start in starts.items()}
+            yield {
+                dim: slice(start, min(start + lengths[dim], shape[dim]))
+                for dim, start in starts.items()
+            }
 
 
 def sizes_within(chunk: Chunk, sizes: Mapping[str, int]) -> dict[str, int]:
     """Lengths of the dimensions of a grid within a chunk of it."""
-    return {dim: chunk[dim].stop - chunk[dim].start if dim in chunk else size for dim, size in sizes.items()}
+    return {
+        dim: chunk[dim].stop - chunk[dim].start if dim in chunk else size
+        for dim, size in sizes.items()
+    }
 
 
 def variables_within(chunk: Chunk, variables: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:

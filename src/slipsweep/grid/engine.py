@@ -1,8 +1,9 @@
 """Variables with named dimensions in, variables out: how a grid is solved.
 
-It is cut into tiles of some thousand cells.  The inputs of a tile are gathered by NumPy into an array of cells,
-which a kernel solves (`slipsweep.grid.solvers`), on as many threads as there are; what it finds of a cell, in units of
-phase, is spread over the frequencies of that cell: v = V/ω and u = W/ω² (the scaling law).
+It is cut into tiles of some thousand cells.  The inputs of a tile are gathered by NumPy into an
+array of cells, which a kernel solves (`slipsweep.grid.solvers`), on as many threads as there are;
+what it finds of a cell, in units of phase, is spread over the frequencies of that cell: v = V/ω and
+u = W/ω² (the scaling law).
 """
 
 import math
@@ -27,10 +28,13 @@ from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import Sine, Waveform, peak_acceleration
 
-#: Cells that a kernel solves in a call, at least and at most: Python's part is small, and Ctrl-C heard between two.
-_LEAST_TILE, _MOST_TILE = 16384, 65536
+#: Cells that a kernel solves in a call, at least and at most: Python's part is small, and Ctrl-C
+#: heard between two.
+_LEAST_TILE = 16384
+_MOST_TILE = 65536
 
-#: Powers of 1/ω, or of the factor on a record's time, in results; others do not scale with the time.
+#: Powers of 1/ω, or of the factor on a record's time, in results; others do not scale with the
+#: time.
 _POWERS = {"permanent_displacement": 2, "newmark_displacement": 2, "peak_relative_velocity": 1}
 
 #: Inputs or results by their names.
@@ -41,17 +45,19 @@ Variables: TypeAlias = Mapping[str, xr.Variable]
 class Request:
     """A grid, and the results wanted of it.
 
-    `inputs` has `theta` (degrees), `mu_s`, the optional parameters and the strength and the time of the shaking: under
-    a waveform `amplitude` or `displacement_amplitude`, and `frequency` (Hz); under records one of
-    `variables.STRENGTHS`, `time_scale` and `polarity`, of a suite also the place of the `motion` in it, and of pairs
-    `azimuth`.
+    `inputs` has `theta` (degrees), `mu_s`, the optional parameters and the strength and the time of
+    the shaking: under a waveform `amplitude` or `displacement_amplitude`, and `frequency` (Hz);
+    under records one of `variables.STRENGTHS`, `time_scale` and `polarity`, of a suite also the
+    place of the `motion` in it, and of pairs `azimuth`.
     """
 
     problem: Problem
     sizes: Mapping[str, int]  # dimensions of the results, in their order, and their lengths
     inputs: Variables  # along some of these dimensions
     wanted: tuple[str, ...]  # names of results; nothing else is computed
-    progress: Callable[[int], None] | None = None  # told of cells as they are finished, from any thread
+    progress: Callable[[int], None] | None = (
+        None  # told of cells as they are finished, from any thread
+    )
 
     @property
     def dtypes(self) -> dict[str, np.dtype[Any]]:
@@ -65,8 +71,11 @@ class Request:
 
     def results(self) -> dict[str, xr.Variable]:
         """What is wanted, not filled in."""
-        dims, shape = tuple(self.sizes), tuple(self.sizes.values())
-        return {name: xr.Variable(dims, np.empty(shape, dtype)) for name, dtype in self.dtypes.items()}
+        dims = tuple(self.sizes)
+        shape = tuple(self.sizes.values())
+        return {
+            name: xr.Variable(dims, np.empty(shape, dtype)) for name, dtype in self.dtypes.items()
+        }
 
     def count(self, cells: int) -> None:
         """Report cells as finished."""
@@ -75,26 +84,36 @@ class Request:
 
     def part(self, chunk: Chunk) -> "Request":
         """The same of a part of the grid."""
-        return replace(self, sizes=sizes_within(chunk, self.sizes), inputs=variables_within(chunk, self.inputs))
+        return replace(
+            self, sizes=sizes_within(chunk, self.sizes), inputs=variables_within(chunk, self.inputs)
+        )
 
 
 def solve(request: Request) -> Variables:
     """Solve a grid for the results of a motion: those of `solvers.ROWS`.
 
-    InputError: a result that has a value is beyond double precision.  RunError: an event was not found.
+    InputError: a result that has a value is beyond double precision.  RunError: an event was not
+    found.
     """
-    results, wants_peak = request.results(), "peak_relative_velocity" in request.wanted
+    results = request.results()
+    wants_peak = "peak_relative_velocity" in request.wanted
     for where, part in motions(request):
-        polarity = float(part.inputs["polarity"].values.item()) if "polarity" in part.inputs else 1.0
-        _fill(variables_within(where, results), part, solvers.solver_of(part.problem, wants_peak, polarity))
+        polarity = (
+            float(part.inputs["polarity"].values.item()) if "polarity" in part.inputs else 1.0
+        )
+        _fill(
+            variables_within(where, results),
+            part,
+            solvers.solver_of(part.problem, wants_peak, polarity),
+        )
     return results
 
 
 def friction_parameters(request: Request, finite: bool = True) -> Variables:
     """Eqs. 7-11 and λ of every cell, `sliding_mode` and the validity known before the motion; no frequency.
 
-    They are of a harmonic motion of that `amplitude`, whatever shakes the base.  Errors as of `solve`, but that
-    estimates need not be `finite`.  A cell without a value has NaN.
+    They are of a harmonic motion of that `amplitude`, whatever shakes the base.  Errors as of
+    `solve`, but that estimates need not be `finite`.  A cell without a value has NaN.
     """
     request = replace(request, problem=replace(request.problem, excitation=Sine()))
     results = request.results()
@@ -118,16 +137,22 @@ def amplitudes(request: Request) -> Variables:
 def motions(request: Request) -> Iterator[tuple[Chunk, Request]]:
     """The parts of a grid that one motion shakes, and where in the grid they lie; under a waveform all of it.
 
-    Of a suite each is under a record of its own, with which a solver goes on as if there were no other.
+    Of a suite each is under a record of its own, with which a solver goes on as if there were no
+    other.
     """
-    own = (request.inputs[name].sizes for name in ("motion", "azimuth", "polarity") if name in request.inputs)
+    own = (
+        request.inputs[name].sizes
+        for name in ("motion", "azimuth", "polarity")
+        if name in request.inputs
+    )
     varying = {str(dim): size for sizes in own for dim, size in sizes.items()}
     suite = request.problem.excitation
     for where in grid_chunks(varying, 1):
         part = request.part(where)
         if isinstance(suite, Suite):
             inputs = dict(part.inputs)
-            motion, azimuth = inputs.pop("motion"), inputs.pop("azimuth", xr.Variable((), 0.0))
+            motion = inputs.pop("motion")
+            azimuth = inputs.pop("azimuth", xr.Variable((), 0.0))
             record = suite.record(int(motion.values.item()), float(azimuth.values.item()))
             part = replace(part, problem=replace(part.problem, excitation=record), inputs=inputs)
         yield where, part
@@ -139,7 +164,9 @@ def cell_inputs(problem: Problem, inputs: Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(record := problem.excitation, Record):
         given["amplitude"] = strength_factor(record.times, record.acceleration, inputs)
     elif "displacement_amplitude" in inputs:
-        given["amplitude"] = peak_acceleration(inputs["displacement_amplitude"], inputs["frequency"])
+        given["amplitude"] = peak_acceleration(
+            inputs["displacement_amplitude"], inputs["frequency"]
+        )
     if "yield_coefficient" in inputs:
         given["yield_acceleration"] = inputs["yield_coefficient"] * problem.model.g
     if "theta" in inputs:
@@ -159,14 +186,19 @@ def _scaled_dimension(request: Request) -> str | None:
     in_time = {"frequency", "time_scale", "structure_frequency"}
     if {"displacement_amplitude", "pgv", "arias_intensity"} & request.inputs.keys():
         in_time = {"structure_frequency"}  # the frequency is in the amplitude, too
-    others = {dim for name, one in request.inputs.items() if name not in in_time for dim in one.dims}
+    others = {
+        dim for name, one in request.inputs.items() if name not in in_time for dim in one.dims
+    }
     only = {dim: size for dim, size in request.sizes.items() if dim not in others}
     return max(only, key=lambda dim: only[dim], default=None)
 
 
-def _fill(results: Variables, request: Request, solver: solvers.Solver, finite: bool = True) -> None:
+def _fill(
+    results: Variables, request: Request, solver: solvers.Solver, finite: bool = True
+) -> None:
     """Fill in results, tile by tile, cut from plain arrays: names of dimensions take a part of the cells' time."""
-    scaled, dims = _scaled_dimension(request), tuple(request.sizes)
+    scaled = _scaled_dimension(request)
+    dims = tuple(request.sizes)
     solved = {dim: size for dim, size in request.sizes.items() if dim != scaled}
     share = math.prod(solved.values()) // (8 * threads.thread_count())
     tile = max(min(max(share, _LEAST_TILE), _MOST_TILE) // solvers.cost_of(request.problem), 1)
@@ -177,7 +209,10 @@ def _fill(results: Variables, request: Request, solver: solvers.Solver, finite: 
         targets = {name: one.data[(*where, ...)] for name, one in results.items()}
         given = {}
         for name, values in arrays.items():
-            own = (cut if size > 1 else slice(None) for cut, size in zip(where, values.shape, strict=True))
+            own = (
+                cut if size > 1 else slice(None)
+                for cut, size in zip(where, values.shape, strict=True)
+            )
             given[name] = values[(*own, ...)]
         shape = tuple(chunk[dim].stop - chunk[dim].start if dim in chunk else 1 for dim in dims)
         _fill_tile(targets, request.problem, given, shape, solver, finite)
@@ -187,9 +222,13 @@ def _fill(results: Variables, request: Request, solver: solvers.Solver, finite: 
 
 
 def _fill_tile(
-    results: dict[str, NDArray[Any]], problem: Problem, inputs: Mapping[str, NDArray[Any]], shape: tuple[int, ...],
-    solver: solvers.Solver, finite: bool,
-) -> None:  # fmt: skip
+    results: dict[str, NDArray[Any]],
+    problem: Problem,
+    inputs: Mapping[str, NDArray[Any]],
+    shape: tuple[int, ...],
+    solver: solvers.Solver,
+    finite: bool,
+) -> None:
     """Solve the cells of a tile, in all its dimensions but the scaled one, and spread them over the results."""
     cells = np.full((*shape, len(Cell._fields)), math.nan).view(CELL)[..., 0]
     with np.errstate(all="ignore"):  # results that overflow are refused below
@@ -204,21 +243,32 @@ def _fill_tile(
         valued = validity & np.int16(known.VALUELESS) == 0
         seconds = phase_seconds(problem, inputs)
         for name, target in results.items():
-            own, factor = found[solver.rows[name]].reshape(shape), seconds ** _POWERS.get(name, 0)
+            own = found[solver.rows[name]].reshape(shape)
+            factor = seconds ** _POWERS.get(name, 0)
             np.multiply(own, factor, out=target, casting="unsafe")
             largest = np.abs(own[valued]).max(initial=0.0) if target.dtype.kind == "f" else 0.0
-            if finite and not math.isfinite(largest * factor.max()) and (wrong := valued & ~np.isfinite(target)).any():
+            if (
+                finite
+                and not math.isfinite(largest * factor.max())
+                and (wrong := valued & ~np.isfinite(target)).any()
+            ):
                 why = f"{name} is then no finite number in double precision; must be nearer to 1"
                 raise InputError(f"{_inputs_at(wrong, problem, inputs)}: {why}")
     if "structure_frequency" in inputs and "validity" in results:
         # a block that is not rigid, 0.2 ≤ f/fs ≤ 1.3
         ratio = inputs["frequency"] / inputs["structure_frequency"]
-        results["validity"] |= ((ratio >= 0.2) & (ratio <= 1.3)) * np.int16(known.Validity.FLEXIBLE_BLOCK)
+        results["validity"] |= ((ratio >= 0.2) & (ratio <= 1.3)) * np.int16(
+            known.Validity.FLEXIBLE_BLOCK
+        )
 
 
-def _inputs_at(wrong: NDArray[np.bool_], problem: Problem, inputs: Mapping[str, NDArray[Any]]) -> str:
+def _inputs_at(
+    wrong: NDArray[np.bool_], problem: Problem, inputs: Mapping[str, NDArray[Any]]
+) -> str:
     """The inputs of the first cell that is wrong, in words."""
     every = np.broadcast_arrays(wrong, *inputs.values())
     cell = np.unravel_index(int(every[0].argmax()), every[0].shape)
-    values = {name: float(one[cell]) for name, one in zip(inputs, every[1:], strict=True)} | {"g": problem.model.g}
+    values = {name: float(one[cell]) for name, one in zip(inputs, every[1:], strict=True)} | {
+        "g": problem.model.g
+    }
     return ", ".join(f"{name} = {number_text(value)}" for name, value in values.items())

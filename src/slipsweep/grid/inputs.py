@@ -31,7 +31,9 @@ def check_problem(excitation: Any, model: Any, solver: Any) -> Problem:
     motion = excitation if isinstance(excitation, (Record, Suite)) else WAVEFORMS.of(excitation)
     chosen = SOLVERS.of(solver)
     if isinstance(motion, (Record, Suite)) and not isinstance(chosen, Cycle):
-        raise InputError(f"solver = {chosen}: not allowed with a {type(motion).__name__}, to which Cycle() is exact")
+        raise InputError(
+            f"solver = {chosen}: not allowed with a {type(motion).__name__}, to which Cycle() is exact"
+        )
     return Problem(MODELS.of(model), motion, chosen)
 
 
@@ -39,8 +41,9 @@ def check_problem(excitation: Any, model: Any, solver: Any) -> Problem:
 class Inputs:
     """What `slipsweep.sweep` takes beside its options; None is not given.
 
-    Each is a number, a 1-D array, or an `xarray.Variable` or `DataArray` with dimensions of its own, in the units of
-    `slipsweep.model.variables.PARAMETERS`.  The functions that take one check them.
+    Each is a number, a 1-D array, or an `xarray.Variable` or `DataArray` with dimensions of its
+    own, in the units of `slipsweep.model.variables.PARAMETERS`.  The functions that take one check
+    them.
 
     Examples
     --------
@@ -76,7 +79,8 @@ class Inputs:
 
 def check_parameters(problem: Problem, inputs: Inputs) -> dict[str, xr.Variable]:
     """The parameters of a sweep, all that it needs and no others, as `checked` has them."""
-    motion, given = problem.excitation, inputs.given
+    motion = problem.excitation
+    given = inputs.given
     _refuse_others(motion, given)
     _check_interface(problem.model, given)
     if isinstance(motion, Waveform):
@@ -91,7 +95,9 @@ def check_parameters(problem: Problem, inputs: Inputs) -> dict[str, xr.Variable]
         return found
     strengths = [name for name in known.STRENGTHS if name in given]
     if len(strengths) > 1:
-        raise InputError(f"{', '.join(strengths[:2])}: must not both be given; either is the strength of the motion")
+        raise InputError(
+            f"{', '.join(strengths[:2])}: must not both be given; either is the strength of the motion"
+        )
     has_pairs = isinstance(motion, Suite) and motion.has_pairs
     if has_pairs and "azimuth" not in given:
         raise InputError("azimuth: must be given with pairs of components")
@@ -99,10 +105,14 @@ def check_parameters(problem: Problem, inputs: Inputs) -> dict[str, xr.Variable]
         raise InputError("azimuth: only with a Suite of pairs of components (read_suite: pairs)")
     for name in ("decay_rate", "delta_mu", "minimum_friction"):
         if name in given and isinstance(problem.model, Newmark):
-            raise InputError(f"{name}: not allowed with model = 'newmark', which has no friction law")
+            raise InputError(
+                f"{name}: not allowed with model = 'newmark', which has no friction law"
+            )
     polarity = _polarity(given.pop("polarity", 1))
     given = {"time_scale": 1.0} | ({} if strengths else {"scale": 1.0}) | given
-    found = checked({name: given[name] for name in known.PARAMETERS if name in given}, problem.model.g)
+    found = checked(
+        {name: given[name] for name in known.PARAMETERS if name in given}, problem.model.g
+    )
     found["polarity"] = polarity
     if isinstance(motion, Suite):
         found |= _motion_coordinates(motion, found)
@@ -114,7 +124,11 @@ def check_parameters(problem: Problem, inputs: Inputs) -> dict[str, xr.Variable]
 def _refuse_others(motion: Waveform | Record | Suite, given: Mapping[str, Any]) -> None:
     """Refuse inputs of another kind of shaking."""
     is_wave = isinstance(motion, Waveform)
-    what, taken = ("waveform", known.WAVEFORM_INPUTS) if is_wave else (type(motion).__name__, known.RECORD_INPUTS)
+    what, taken = (
+        ("waveform", known.WAVEFORM_INPUTS)
+        if is_wave
+        else (type(motion).__name__, known.RECORD_INPUTS)
+    )
     for name in given:
         if name in {*known.WAVEFORM_INPUTS, *known.RECORD_INPUTS} - {*taken}:
             raise InputError(f"{name}: not allowed with a {what}, which takes {', '.join(taken)}")
@@ -140,23 +154,36 @@ def _polarity(given: Any) -> xr.Variable:
     """The signs asked for: 1, -1, both."""
     values = np.empty(0)
     with suppress(InputError):
-        values = parameters.check_numbers("polarity", (1, -1) if isinstance(given, str) and given == "both" else given)
+        values = parameters.check_numbers(
+            "polarity", (1, -1) if isinstance(given, str) and given == "both" else given
+        )
     if values.ndim > 1 or not values.size or not np.isin(values, (1, -1)).all():
-        raise InputError(f"polarity = {parameters.shown(given)}: must be 1, -1, a list of these, or 'both'")
-    return xr.Variable(("polarity",) * values.ndim, values.astype(np.int8), known.PARAMETERS["polarity"])
+        raise InputError(
+            f"polarity = {parameters.shown(given)}: must be 1, -1, a list of these, or 'both'"
+        )
+    return xr.Variable(
+        ("polarity",) * values.ndim, values.astype(np.int8), known.PARAMETERS["polarity"]
+    )
 
 
 def _motion_coordinates(suite: Suite, coords: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:
     """The labels of a suite and its intensity measures: coordinates along `motion`, of pairs also along the azimuth."""
     about = known.MOTION_COORDINATES
-    found = {"motion": xr.Variable("motion", np.array(suite.labels), {"long_name": "recorded motion"})}
+    found = {
+        "motion": xr.Variable("motion", np.array(suite.labels), {"long_name": "recorded motion"})
+    }
     found |= {name: xr.Variable("motion", one, about[name]) for name, one in suite.measures.items()}
     if suite.has_pairs:
-        both = {"azimuth": coords["azimuth"], "motion": xr.Variable("motion", np.arange(len(suite)))}
+        both = {
+            "azimuth": coords["azimuth"],
+            "motion": xr.Variable("motion", np.arange(len(suite))),
+        }
         sizes = grid_sizes(both)
         azimuths, places = (one.set_dims(sizes).values for one in both.values())
         measures = suite.intensities(places, azimuths)
-        found |= {name: xr.Variable(tuple(sizes), one, about[name]) for name, one in measures.items()}
+        found |= {
+            name: xr.Variable(tuple(sizes), one, about[name]) for name, one in measures.items()
+        }
     return found
 
 
@@ -178,10 +205,12 @@ def checked(given: Mapping[str, Any], g: float) -> dict[str, xr.Variable]:
     """
     checked = {}
     for name, one in given.items():
-        values, attrs = parameters.check_values(name, one, g=g), known.PARAMETERS[name]
+        values = parameters.check_values(name, one, g=g)
+        attrs = known.PARAMETERS[name]
         dims = (name,) * values.ndim
         if isinstance(one, (xr.Variable, xr.DataArray)):
-            dims, attrs = tuple(map(str, one.dims)), {**one.attrs, **attrs}
+            dims = tuple(map(str, one.dims))
+            attrs = {**one.attrs, **attrs}
             if len({*dims}) < len(dims):
                 raise InputError(f"{name}: dimensions {', '.join(dims)}: must be named each once")
         elif values.ndim > 1:
@@ -193,7 +222,9 @@ def checked(given: Mapping[str, Any], g: float) -> dict[str, xr.Variable]:
             raise InputError(f"{name} = []: must hold at least one value")
         checked[name] = xr.Variable(dims, values, attrs)
         if name == "phi":
-            checked["mu_s"] = xr.Variable(dims, parameters.friction_coefficient(values), known.PARAMETERS["mu_s"])
+            checked["mu_s"] = xr.Variable(
+                dims, parameters.friction_coefficient(values), known.PARAMETERS["mu_s"]
+            )
     return checked
 
 
@@ -203,14 +234,18 @@ def grid_sizes(variables: Mapping[str, xr.Variable]) -> dict[str, int]:
     for name, variable in variables.items():
         for dim, size in zip(map(str, variable.dims), variable.shape, strict=True):
             if sizes.setdefault(dim, size) != size:
-                raise InputError(f"{name}: {size} values along {dim!r}, where another parameter has {sizes[dim]}")
+                raise InputError(
+                    f"{name}: {size} values along {dim!r}, where another parameter has {sizes[dim]}"
+                )
     order = [*dict.fromkeys((*known.DIMENSION_ORDER, *sizes))]
     return {dim: sizes[dim] for dim in order if dim in sizes}
 
 
 def inputs_of(problem: Problem, coords: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:
     """The coordinates that cells are solved for: no friction angle; of a motion its place in the suite, and no more."""
-    own = {name: one for name, one in coords.items() if name not in ("phi", *known.MOTION_COORDINATES)}
+    own = {
+        name: one for name, one in coords.items() if name not in ("phi", *known.MOTION_COORDINATES)
+    }
     suite = problem.excitation
     if not isinstance(suite, Suite):
         return own

@@ -1,8 +1,8 @@
 """What a caller asks for, checked and laid out: parameters in, a plan, a table out.
 
-A plan holds the coordinates, and the tasks that give the results: one for the motion, one for the friction
-parameters, which have no frequency dimension.  It can be cut into parts; solved at once or part by part, it gives the
-same bits.
+A plan holds the coordinates, and the tasks that give the results: one for the motion, one for the
+friction parameters, which have no frequency dimension.  It can be cut into parts; solved at once or
+part by part, it gives the same bits.
 """
 
 import math
@@ -42,11 +42,15 @@ class Plan:
     names: tuple[str, ...]  # of the results, in the order of the table
     attrs: dict[str, Any]
     cost: float = 1.0  # of a cell of the grid, in cells of the cycle solver
-    together: tuple[str, ...] = ()  # dimensions along which a part takes about as much as all: to be cut last
+    together: tuple[
+        str, ...
+    ] = ()  # dimensions along which a part takes about as much as all: to be cut last
     memory: int = 0  # bytes that solving takes beside the results, however small the grid
     cell_memory: int = 0  # bytes for each cell of the grid that it takes beside them
     #: Attributes of the results.
-    described: Mapping[str, Mapping[str, Any]] = field(default_factory=lambda: known.RESULTS | known.RECORD_RESULTS)
+    described: Mapping[str, Mapping[str, Any]] = field(
+        default_factory=lambda: known.RESULTS | known.RECORD_RESULTS
+    )
 
     def __post_init__(self) -> None:
         check_dimensions(self.sizes, self.coords, self.names)
@@ -58,7 +62,8 @@ class Plan:
 
     def part(self, chunk: chunks.Chunk) -> "Plan":
         """The plan of a chunk of the grid, which gives the same bits as the whole does there."""
-        sizes, coords = chunks.sizes_within(chunk, self.sizes), chunks.variables_within(chunk, self.coords)
+        sizes = chunks.sizes_within(chunk, self.sizes)
+        coords = chunks.variables_within(chunk, self.coords)
         tasks = tuple((solver, request.part(chunk)) for solver, request in self.tasks)
         return replace(self, sizes=sizes, coords=coords, tasks=tasks)
 
@@ -69,19 +74,30 @@ class Plan:
         """
         check_progress(progress)
         requests = [request for _, request in self.tasks]
-        cells, grid = max(((one.cells, resources.grid_text(one.sizes)) for one in requests), default=(0, ""))
-        itemsizes = (one.cells * sum(dtype.itemsize for dtype in one.dtypes.values()) for one in requests)
+        cells, grid = max(
+            ((one.cells, resources.grid_text(one.sizes)) for one in requests), default=(0, "")
+        )
+        itemsizes = (
+            one.cells * sum(dtype.itemsize for dtype in one.dtypes.values()) for one in requests
+        )
         needed = cells * self.cell_memory + sum(itemsizes)
         advice = "ask for fewer variables or cells, or give chunks= for a lazy result"
         resources.check_memory(f"grid of {grid}, {cells:.4g} cells", needed, advice)
         # all tasks cover the same cells: one of them counts
-        counting = [replace(one, progress=progress if at == 0 else None) for at, one in enumerate(requests)]
-        return self._table([solver(one) for (solver, _), one in zip(self.tasks, counting, strict=True)])
+        counting = [
+            replace(one, progress=progress if at == 0 else None) for at, one in enumerate(requests)
+        ]
+        return self._table(
+            [solver(one) for (solver, _), one in zip(self.tasks, counting, strict=True)]
+        )
 
     def template(self) -> xr.Dataset:
         """The results with their dimensions and coordinates but no values: zeros that take no memory."""
         return self._table(
-            {name: xr.Variable((), np.zeros((), dtype)).set_dims(one.sizes) for name, dtype in one.dtypes.items()}
+            {
+                name: xr.Variable((), np.zeros((), dtype)).set_dims(one.sizes)
+                for name, dtype in one.dtypes.items()
+            }
             for _, one in self.tasks
         )
 
@@ -91,13 +107,17 @@ class Plan:
 
         if not lengths:  # one cell
             return self.solve()
-        # an array with an element for each chunk of the grid, which is all its results: they come out of one task
+        # an array with an element for each chunk of the grid, which is all its results: they come
+        # out of one task
         ones = tuple((1,) * len(own) for own in lengths.values())
         meta = np.empty((0,) * len(ones), object)
-        solved = da.map_blocks(_solved, plan=self, lengths=dict(lengths), chunks=ones, dtype=object, meta=meta)
+        solved = da.map_blocks(
+            _solved, plan=self, lengths=dict(lengths), chunks=ones, dtype=object, meta=meta
+        )
         table = self.template()
         for name, result in table.data_vars.items():
-            # it has some dimensions of the grid, in their order, and perhaps others of its own after them
+            # it has some dimensions of the grid, in their order, and perhaps others of its own
+            # after them
             own = [dim for dim in result.dims if dim in lengths]
             table[name].data = da.map_blocks(
                 _result,
@@ -114,11 +134,16 @@ class Plan:
     def _table(self, results: Iterable[engine.Variables]) -> xr.Dataset:
         """The results of all tasks, described."""
         found = {name: one for own in results for name, one in own.items()}
-        table = {name: xr.Variable(found[name].dims, found[name].data, self.described[name]) for name in self.names}
+        table = {
+            name: xr.Variable(found[name].dims, found[name].data, self.described[name])
+            for name in self.names
+        }
         return xr.Dataset(table, self.coords, self.attrs)
 
 
-def _solved(plan: Plan, lengths: Mapping[str, tuple[int, ...]], block_id: tuple[int, ...]) -> np.ndarray:
+def _solved(
+    plan: Plan, lengths: Mapping[str, tuple[int, ...]], block_id: tuple[int, ...]
+) -> np.ndarray:
     """The results of a chunk as the element of an array."""
     edges = zip(lengths.items(), block_id, strict=True)
     chunk = {dim: slice(sum(own[:at]), sum(own[: at + 1])) for (dim, own), at in edges}
@@ -152,10 +177,13 @@ def plan_sweep(
     drive = _drive(solved)
     if "displacement_amplitude" in drive:
         dims = grid_inputs.grid_sizes(drive)
-        # as a coordinate it takes no more than what it is made of, and on a grid of the two as much as a result
+        # as a coordinate it takes no more than what it is made of, and on a grid of the two as much
+        # as a result
         if any(dims.keys() == set(variable.dims) for variable in drive.values()):
             peak = peak_acceleration(**drive).transpose(*dims)
-            coords = coords | {"amplitude": xr.Variable(tuple(dims), peak.data, known.PARAMETERS["amplitude"])}
+            coords = coords | {
+                "amplitude": xr.Variable(tuple(dims), peak.data, known.PARAMETERS["amplitude"])
+            }
 
     tasks = []
     if motion := tuple(name for name in wanted if name in ROWS and name != "newmark_displacement"):
@@ -165,13 +193,25 @@ def plan_sweep(
         tasks.append(_task(engine.solve, classical, ("newmark_displacement",), solved))
     cost = cost_of(problem) * max(len(tasks), 1)
     # one that was given is a coordinate already
-    if friction := tuple(name for name in known.FRICTION_PARAMETERS if name in wanted and name not in solved):
+    if friction := tuple(
+        name for name in known.FRICTION_PARAMETERS if name in wanted and name not in solved
+    ):
         tasks.append(_friction_task(problem, friction, solved))
-    if amplitude := tuple(name for name in ("amplitude", "motion_factor") if name in wanted and name not in coords):
+    if amplitude := tuple(
+        name for name in ("amplitude", "motion_factor") if name in wanted and name not in coords
+    ):
         tasks.append(_task(engine.amplitudes, problem, amplitude, drive))
     names = tuple(name for name in wanted if any(name in request.wanted for _, request in tasks))
     attrs = _about(problem, coords)
-    return Plan(grid_inputs.grid_sizes(solved), coords, tuple(tasks), names, attrs, cost, memory=memory_of(problem))
+    return Plan(
+        grid_inputs.grid_sizes(solved),
+        coords,
+        tuple(tasks),
+        names,
+        attrs,
+        cost,
+        memory=memory_of(problem),
+    )
 
 
 def plan_friction_parameters(inputs: grid_inputs.Inputs, *, model: Any = "mendez") -> Plan:
@@ -180,56 +220,93 @@ def plan_friction_parameters(inputs: grid_inputs.Inputs, *, model: Any = "mendez
     check_given(inputs.given, ("theta", "amplitude"))
     check_friction(inputs.given)
     coords = grid_inputs.checked(inputs.given, problem.model.g)
-    names = (*(name for name in known.FRICTION_PARAMETERS if name not in coords), "sliding_mode", "validity")
+    names = (
+        *(name for name in known.FRICTION_PARAMETERS if name not in coords),
+        "sliding_mode",
+        "validity",
+    )
     task = _friction_task(problem, names, coords)
     attrs = {"title": "Friction parameters", **_SOURCE, **options.MODELS.attributes(problem.model)}
     return Plan(dict(task[1].sizes), coords, (task,), names, attrs)
 
 
-def check_dimensions(sizes: Mapping[str, int], coords: engine.Variables, results: Collection[str]) -> None:
+def check_dimensions(
+    sizes: Mapping[str, int], coords: engine.Variables, results: Collection[str]
+) -> None:
     """Refuse dimensions that no dataset can have with what is in it; DataArrays may name any."""
     for dim in sizes:
         if dim in results:
-            raise InputError(f"{dim}: is the name of a result: must not be that of a dimension as well")
+            raise InputError(
+                f"{dim}: is the name of a result: must not be that of a dimension as well"
+            )
         if dim in coords and dim not in coords[dim].dims:
-            raise InputError(f"{dim}: is a dimension of another parameter: must have values along it")
+            raise InputError(
+                f"{dim}: is a dimension of another parameter: must have values along it"
+            )
 
 
 def _drive(inputs: engine.Variables) -> dict[str, xr.Variable]:
     """The inputs that the amplitude of the base depends on."""
     strength = next(name for name in ("displacement_amplitude", *known.STRENGTHS) if name in inputs)
-    clocks = {"displacement_amplitude": "frequency", "pgv": "time_scale", "arias_intensity": "time_scale"}
+    clocks = {
+        "displacement_amplitude": "frequency",
+        "pgv": "time_scale",
+        "arias_intensity": "time_scale",
+    }
     names = (strength, clocks.get(strength, strength), "azimuth", "motion")
     return {name: inputs[name] for name in names if name in inputs}
 
 
-def _task(solver: Any, problem: grid_inputs.Problem, names: tuple[str, ...], inputs: engine.Variables) -> Task:
+def _task(
+    solver: Any, problem: grid_inputs.Problem, names: tuple[str, ...], inputs: engine.Variables
+) -> Task:
     """The task of some results, on the dimensions of these inputs."""
     return solver, engine.Request(problem, grid_inputs.grid_sizes(inputs), inputs, names)
 
 
-def _friction_task(problem: grid_inputs.Problem, names: tuple[str, ...], inputs: engine.Variables) -> Task:
+def _friction_task(
+    problem: grid_inputs.Problem, names: tuple[str, ...], inputs: engine.Variables
+) -> Task:
     """Eqs. 7-11 on the dimensions they depend on."""
-    if "yield_coefficient" in inputs and (unknown := [name for name in names if name != "yield_acceleration"]):
-        raise InputError(f"variables: {unknown[0]} needs theta and mu_s in place of yield_coefficient")
+    if "yield_coefficient" in inputs and (
+        unknown := [name for name in names if name != "yield_acceleration"]
+    ):
+        raise InputError(
+            f"variables: {unknown[0]} needs theta and mu_s in place of yield_coefficient"
+        )
     drive = _drive(inputs)
     strength, values = next(iter(drive.items()))
     for name in ("delta_mu", "decay_rate"):
         if name in names and (values == 0.0).any():
-            raise InputError(f"{strength} = 0: has no finite {name} (Eqs. 6, 11); must be > 0, or {name} be given")
+            raise InputError(
+                f"{strength} = 0: has no finite {name} (Eqs. 6, 11); must be > 0, or {name} be given"
+            )
     own = {*known.INTERFACE_INPUTS, "yield_coefficient", "amplitude", *drive}
-    return _task(engine.friction_parameters, problem, names, {name: one for name, one in inputs.items() if name in own})
+    return _task(
+        engine.friction_parameters,
+        problem,
+        names,
+        {name: one for name, one in inputs.items() if name in own},
+    )
 
 
 def _about(problem: grid_inputs.Problem, given: Collection[str]) -> dict[str, Any]:
     """What results say of themselves: the choices read back from it are those of the problem."""
-    motion, title = problem.excitation, "Response of a rigid block to a recorded motion"
+    motion = problem.excitation
+    title = "Response of a rigid block to a recorded motion"
     if isinstance(motion, Record):
         shaking = {"record": motion.name, **motion.attrs}
     elif isinstance(motion, Suite):
-        title, shaking = "Response of a rigid block to a suite of recorded motions", {**motion.attrs}
+        title = "Response of a rigid block to a suite of recorded motions"
+        shaking = {**motion.attrs}
     else:
         title = "Permanent displacement of a rigid block, swept"
         shaking = WAVEFORMS.attributes(motion) | options.SOLVERS.attributes(problem.solver)
     inputs = {"friction_inputs": options.friction_inputs(problem.model.name, given, {})}
-    return {"title": title, **_SOURCE, **options.MODELS.attributes(problem.model), **inputs, **shaking}
+    return {
+        "title": title,
+        **_SOURCE,
+        **options.MODELS.attributes(problem.model),
+        **inputs,
+        **shaking,
+    }

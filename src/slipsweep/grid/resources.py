@@ -13,9 +13,14 @@ def check_memory(what: str, needed: int, advice: str) -> None:
         lines = Path("/proc/meminfo").read_text().splitlines()
     except OSError:
         return
-    free = int(next((line.split()[1] for line in lines if line.startswith("MemAvailable:")), needed)) * 1024
+    free = (
+        int(next((line.split()[1] for line in lines if line.startswith("MemAvailable:")), needed))
+        * 1024
+    )
     if needed > free:
-        raise InputError(f"{what}: takes {size_text(needed)}, but {size_text(free)} of memory is free; {advice}")
+        raise InputError(
+            f"{what}: takes {size_text(needed)}, but {size_text(free)} of memory is free; {advice}"
+        )
 
 
 def grid_text(sizes: Mapping[str, int]) -> str:
@@ -38,4 +43,7 @@ def parse_size(name: str, text: str) -> int:
     if match is None:
         raise InputError(f"{name} = {text}: must be a number with a unit, like 512MiB or 2GB")
     number, prefix, binary = match.groups()
-    return int(float(number) * (1024 if binary else 1000) ** ("kMGT".index("k" if prefix in "kK" else prefix) + 1))
+    return int(
+        float(number)
+        * (1024 if binary else 1000) ** ("kMGT".index("k" if prefix in "kK" else prefix) + 1)
+    )

@@ -31,7 +31,9 @@ ROWS = {_NAMES.get(field, field): row for row, field in enumerate(physics.Motion
 ROWS["newmark_displacement"] = ROWS["permanent_displacement"]
 
 #: The same of `find_parameters`.
-_PARAMETER_ROWS = {name: row for row, name in enumerate((*FRICTION_PARAMETERS, "sliding_mode", "validity"))}
+_PARAMETER_ROWS = {
+    name: row for row, name in enumerate((*FRICTION_PARAMETERS, "sliding_mode", "validity"))
+}
 
 
 class Solver(NamedTuple):
@@ -46,7 +48,9 @@ def options_of(problem: Problem, wants_peak: bool) -> physics.Options:
     model = problem.model
     return physics.Options(
         rise=RISES[model.rise] if isinstance(model, Mendez) else physics.NEWMARK,
-        recoupling=RECOUPLINGS[model.recoupling] if isinstance(model, Mendez) else physics.INTEGRATE,
+        recoupling=RECOUPLINGS[model.recoupling]
+        if isinstance(model, Mendez)
+        else physics.INTEGRATE,
         cycles=problem.excitation.cycles if isinstance(problem.excitation, Waveform) else 1,
         wants_peak=wants_peak,
         g=model.g,
@@ -61,7 +65,8 @@ def parameter_solver(problem: Problem) -> Solver:
 
 def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
     """What solves the cells of a problem that one motion shakes."""
-    motion, options = problem.excitation, options_of(problem, wants_peak)
+    motion = problem.excitation
+    options = options_of(problem, wants_peak)
 
     def under_wave(cells: np.ndarray, results: np.ndarray) -> None:
         wave = cutting.wave_of(motion)
@@ -76,11 +81,18 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
 
     if isinstance(motion, Record):
         wave = cutting.wave_of_record(motion, polarity)
-        return Solver(lambda cells, results: solve_record(cells, options, wave, workspace_of(wave), results), ROWS)
+        return Solver(
+            lambda cells, results: solve_record(cells, options, wave, workspace_of(wave), results),
+            ROWS,
+        )
     assert isinstance(motion, Waveform)
     if isinstance(problem.solver, Step):
-        wave, rule, count = cutting.wave_of(motion), RULES[problem.solver.rule], problem.solver.steps_per_cycle
-        return Solver(lambda cells, results: solve_steps(cells, options, wave, rule, count, results), ROWS)
+        wave = cutting.wave_of(motion)
+        rule = RULES[problem.solver.rule]
+        count = problem.solver.steps_per_cycle
+        return Solver(
+            lambda cells, results: solve_steps(cells, options, wave, rule, count, results), ROWS
+        )
     return Solver(under_sine if is_plain_sine(motion) else under_wave, ROWS)
 
 
@@ -96,7 +108,9 @@ def cost_of(problem: Problem) -> int:
         if isinstance(problem.solver, Step):
             return 1 + problem.solver.steps_per_cycle // 16
         return 1 if is_plain_sine(motion) else 16
-    return max(64, max(one.times.size for one in (motion if isinstance(motion, Suite) else (motion,))) // 8)
+    return max(
+        64, max(one.times.size for one in (motion if isinstance(motion, Suite) else (motion,))) // 8
+    )
 
 
 def memory_of(problem: Problem) -> int:

@@ -12,8 +12,11 @@ from slipsweep.errors import InputError
 from slipsweep.grid.chunks import CHUNK_CELLS, grid_chunks
 from slipsweep.model.variables import SensitivityStatus, SlidingMode, Validity
 
-#: Ratios are counted in this many classes of equal width in their logarithms, 0.1 % wide, between these.
-_CLASSES, _LEAST, _LARGEST = 32_000, 1e-7, 1e7
+#: Ratios are counted in this many classes of equal width in their logarithms, 0.1 % wide, between
+#: these.
+_CLASSES = 32_000
+_LEAST = 1e-7
+_LARGEST = 1e7
 
 _MOVED = ("permanent_displacement", "newmark_displacement")
 
@@ -27,8 +30,12 @@ class Ratios:
     def add(self, values: NDArray[Any], others: NDArray[Any]) -> None:
         """Count values over others, where neither is zero or missing; a negative one as the least."""
         there = (values != 0.0) & (others != 0.0) & np.isfinite(values) & np.isfinite(others)
-        ratios = np.clip(np.divide(values[there], others[there], dtype=np.float64), _LEAST, _LARGEST)
-        self.counts += np.histogram(np.log(ratios), _CLASSES, (math.log(_LEAST), math.log(_LARGEST)))[0]
+        ratios = np.clip(
+            np.divide(values[there], others[there], dtype=np.float64), _LEAST, _LARGEST
+        )
+        self.counts += np.histogram(
+            np.log(ratios), _CLASSES, (math.log(_LEAST), math.log(_LARGEST))
+        )[0]
 
     @property
     def number(self) -> int:
@@ -79,9 +86,14 @@ def tally_of(results: xr.Dataset) -> Tally:
     if len({results[name].size for name in names}) > 1:
         raise InputError("sliding_mode and validity are not of the same cells")
     tally = Tally(max((results[name].size for name in names), default=0))
-    modes, flags = dict.fromkeys(SlidingMode, 0.0), dict.fromkeys(Validity, 0.0)
-    tally.modes, tally.flags = modes if "sliding_mode" in names else None, flags if "validity" in names else None
-    if results.data_vars.keys() >= {*_MOVED} and results[_MOVED[0]].sizes == results[_MOVED[1]].sizes:
+    modes = dict.fromkeys(SlidingMode, 0.0)
+    flags = dict.fromkeys(Validity, 0.0)
+    tally.modes = modes if "sliding_mode" in names else None
+    tally.flags = flags if "validity" in names else None
+    if (
+        results.data_vars.keys() >= {*_MOVED}
+        and results[_MOVED[0]].sizes == results[_MOVED[1]].sizes
+    ):
         names += _MOVED
         tally.ratios = Ratios()
     widest: Any = max((results[name].sizes for name in names), key=len, default={})
@@ -90,7 +102,9 @@ def tally_of(results: xr.Dataset) -> Tally:
         for mode in SlidingMode if tally.modes else ():
             modes[mode] += np.count_nonzero(part["sliding_mode"] == int(mode))
         for flag in Validity if tally.flags else ():
-            flags[flag] += np.count_nonzero(part["validity"].astype(np.int16, copy=False) & flag.value)
+            flags[flag] += np.count_nonzero(
+                part["validity"].astype(np.int16, copy=False) & flag.value
+            )
         if tally.ratios:
             tally.ratios.add(part[_MOVED[0]], part[_MOVED[1]])
     return tally
@@ -101,16 +115,31 @@ def _tally_of_samples(results: xr.Dataset) -> Tally:
 
     def sums(name: str, own: str) -> dict[int, float]:
         shares = results[name].transpose(..., own).values.reshape(-1, results.sizes[own])
-        return dict(zip(results[own].values.tolist(), shares.sum(axis=0, dtype=np.float64), strict=True))
+        return dict(
+            zip(results[own].values.tolist(), shares.sum(axis=0, dtype=np.float64), strict=True)
+        )
 
     valueless = results["valueless_share"]
-    tally = Tally(valueless.size, flags={Validity(flag): share for flag, share in sums("flag_share", "flag").items()})
+    tally = Tally(
+        valueless.size,
+        flags={Validity(flag): share for flag, share in sums("flag_share", "flag").items()},
+    )
     if {"mode_share", "mode"} <= results.variables.keys():
         tally.modes = {SlidingMode.MISSING: float(valueless.sum(dtype=np.float64))}
-        tally.modes |= {SlidingMode(mode): share for mode, share in sums("mode_share", "mode").items()}
-    if {"sensitivity_status", "first_order_index", "total_index", "input"} <= results.variables.keys():
+        tally.modes |= {
+            SlidingMode(mode): share for mode, share in sums("mode_share", "mode").items()
+        }
+    if {
+        "sensitivity_status",
+        "first_order_index",
+        "total_index",
+        "input",
+    } <= results.variables.keys():
         status = results["sensitivity_status"]
-        both = [results[name].transpose(*status.dims, "input").values for name in ("first_order_index", "total_index")]
+        both = [
+            results[name].transpose(*status.dims, "input").values
+            for name in ("first_order_index", "total_index")
+        ]
         rows = np.stack(both).reshape(2, -1, results.sizes["input"]).astype(np.float64)
         # a file may have passed through other programs
         rows = rows[:, (status.values.ravel() == 0) & np.isfinite(rows).all(axis=(0, 2))]

@@ -4,7 +4,8 @@ One policy, here and nowhere else:
 
 * Kernels are single-threaded and release the GIL; none uses numba's `parallel=True`, whose threading layers can abort.
 * A call from the main thread of a process spreads its cells over Python threads.  A call from any other (dask's
-  scheduler, a worker, a user's own pool) computes on that thread: whoever started it already shares the cores.
+  scheduler, a worker, a user's own pool) computes on that thread: whoever started it already shares
+  the cores.
 * The number of threads is the least of the processor affinity, `NUMBA_NUM_THREADS` and `OMP_NUM_THREADS`.
 * Threads live as long as the call: none is left to be lost in a fork or to hold up the exit.  Ctrl-C is heard between
   two calls of a kernel, a fraction of a second apart.
@@ -25,7 +26,9 @@ def thread_count() -> int:
     """Number of threads a call from here may use."""
     if threading.current_thread() is not threading.main_thread():
         return 1
-    affinity = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    affinity = (
+        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    )
     # the setting, not numba.get_num_threads(): that call starts a threading layer
     limits = [numba.config.NUMBA_NUM_THREADS, affinity]
     # a list has a number for each level of nesting; ours is the first

@@ -34,7 +34,8 @@ _KEPT = 4
 #: Seconds to wait for another process that compiles.
 _PATIENCE = 300.0
 
-#: Seconds that this process has spent compiling, and what is called with a kernel's name before it is compiled.
+#: Seconds that this process has spent compiling, and what is called with a kernel's name before it
+#: is compiled.
 seconds = 0.0
 announce: Callable[[str], object] = str
 
@@ -44,8 +45,8 @@ _compiling = threading.Lock()
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Decorates a function that Python calls; what it calls is decorated as `slipsweep.jit.decorators` says.
 
-    It is compiled by `numba.njit` when first called, or loaded from disk, and runs without the GIL.  Its arguments have
-    the same types in every call.
+    It is compiled by `numba.njit` when first called, or loaded from disk, and runs without the GIL.
+    Its arguments have the same types in every call.
     """
     compiled: Any = function if numba.config.DISABLE_JIT else None
 
@@ -55,9 +56,12 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
         if compiled is None:
             with _compiling:
                 if compiled is None:
-                    # on a thread, which Ctrl-C does not strike: in a callback of LLVM it would be lost
+                    # on a thread, which Ctrl-C does not strike: in a callback of LLVM it would be
+                    # lost
                     with ThreadPoolExecutor(1) as pool:
-                        compiled = pool.submit(_compiled, function, tuple(map(numba.typeof, args))).result()
+                        compiled = pool.submit(
+                            _compiled, function, tuple(map(numba.typeof, args))
+                        ).result()
         return compiled(*args)
 
     return call
@@ -70,7 +74,8 @@ def _compiled(function: Callable[..., Any], types: tuple[Any, ...]) -> Any:
         # numba's advice is for us, not for those who run a sweep
         warnings.simplefilter("ignore", numba.NumbaWarning)
         if folder is not None:
-            # no lock to be had, as on some network folders, or a full disk: each process compiles for itself
+            # no lock to be had, as on some network folders, or a full disk: each process compiles
+            # for itself
             lock = filelock.FileLock(folder / f"{function.__name__}.lock", timeout=_PATIENCE)
             with contextlib.suppress(OSError, NotImplementedError), lock:
                 return _compiled_in(folder, function, types)
@@ -83,7 +88,8 @@ def _compiled_in(folder: Path | None, function: Callable[..., Any], types: tuple
     if not kept:
         announce(function.__name__)
     started = time.perf_counter()
-    given, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
+    given = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(folder)
     try:
         # with its types it is compiled at once, and for no others
         compiled = part("arcp", cache=folder is not None, signature_or_function=[types])(function)
@@ -109,7 +115,9 @@ def cache_folder() -> Path | None:
         folder.touch()
     except (OSError, RuntimeError):  # RuntimeError: neither HOME nor an account
         return None
-    old = sorted((one for one in base.iterdir() if one.is_dir()), key=lambda one: one.stat().st_mtime)
+    old = sorted(
+        (one for one in base.iterdir() if one.is_dir()), key=lambda one: one.stat().st_mtime
+    )
     for other in old[:-_KEPT]:
         shutil.rmtree(other, ignore_errors=True)
     return folder
@@ -117,6 +125,8 @@ def cache_folder() -> Path | None:
 
 def _digest_of_sources() -> str:
     package = Path(__file__).parents[1]
-    sources = [path for room in ("model", "jit", "kernels") for path in (package / room).rglob("*.py")]
+    sources = [
+        path for room in ("model", "jit", "kernels") for path in (package / room).rglob("*.py")
+    ]
     contents = (path.read_bytes() for path in sorted([*sources, package / "motion" / "pieces.py"]))
     return hashlib.sha256(b"".join(contents)).hexdigest()[:16]

@@ -12,31 +12,39 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 def part(*fastmath: str, **options: Any) -> Callable[[_Function], _Function]:
     """`numba.njit` with the options that all have: none assumes away NaN and infinity, which are results here.
 
-    `forceinline` is always said: numba would take it from the function that is compiled just then, and with it hand it
-    on to all that this calls.
+    `forceinline` is always said: numba would take it from the function that is compiled just then,
+    and with it hand it on to all that this calls.
     """
-    own = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", *fastmath}, "forceinline": False}
+    own = {
+        "nogil": True,
+        "error_model": "numpy",
+        "fastmath": {"contract", *fastmath},
+        "forceinline": False,
+    }
     decorate: Callable[[_Function], _Function] = numba.njit(**(own | options))
     return decorate
 
 
-#: `contract` lets the compiler fuse a*b + c, `arcp` divide by g once.  Not `reassoc`: sums whose order the compiler
-#: chooses have other last bits in the process that compiles than in those that load the kernel.
+#: `contract` lets the compiler fuse a*b + c, `arcp` divide by g once.  Not `reassoc`: sums whose
+#: order the compiler chooses have other last bits in the process that compiles than in those that
+#: load the kernel.
 scalar = part("arcp")
 
-#: The same for what stands in loops over cells: LLVM vectorises a loop only if everything in it is inlined, which it
-#: does not do by itself with functions as long as these.  And for what takes a state or a wave at each part of a walk:
-#: their fields are arguments one by one, which takes as long as the step.
+#: The same for what stands in loops over cells: LLVM vectorises a loop only if everything in it is
+#: inlined, which it does not do by itself with functions as long as these.  And for what takes a
+#: state or a wave at each part of a walk: their fields are arguments one by one, which takes as
+#: long as the step.
 inlined = part("arcp", forceinline=True)
 
-#: The same for a function with one caller and many callees, which numba would otherwise optimise once more.
+#: The same for a function with one caller and many callees, which numba would otherwise optimise
+#: once more.
 single = part("arcp", inline="always")
 
 #: The same for elementary functions, which have no division to share.
 elementary = part("nsz", forceinline=True)
 
-#: The same for functions that are passed as values, those of a friction law: numba keeps a kernel on disk only if such
-#: a function is none that was compiled before.
+#: The same for functions that are passed as values, those of a friction law: numba keeps a kernel
+#: on disk only if such a function is none that was compiled before.
 registered: Callable[[_Function], _Function] = numba.extending.register_jitable(
     error_model="numpy", fastmath={"contract", "arcp"}, forceinline=True
 )
@@ -47,8 +55,8 @@ _ffi = cffi.FFI()
 def _uncounted(array: Any) -> Any:
     """The same array, to which numba counts no references.
 
-    For arguments of a kernel, which outlive it: numba would count references to each array of a wave in each function
-    that it goes through, half of the time of a cell.
+    For arguments of a kernel, which outlive it: numba would count references to each array of a
+    wave in each function that it goes through, half of the time of a cell.
     """
     return numba.carray(_ffi.from_buffer(array), array.shape)
 

@@ -1,9 +1,9 @@
 """exp, log and versines in plain arithmetic, so that a loop over them becomes SIMD.
 
 numba as pip installs it has no vector mathematics library (SVML left in 0.62): a `math.exp` in a
-loop is a call of 4.3 ns an element and keeps the whole loop scalar.  `exp` below was seen
-at 0.65 ns an element (AVX-512, in cache), within 1 ulp of the true value.  Polynomials are interpolated at Chebyshev
-nodes.  Ranges, methods, errors: docs/numerics.md#elementary-functions.
+loop is a call of 4.3 ns an element and keeps the whole loop scalar.  `exp` below was seen at 0.65
+ns an element (AVX-512, in cache), within 1 ulp of the true value.  Polynomials are interpolated at
+Chebyshev nodes.  Ranges, methods, errors: docs/numerics.md#elementary-functions.
 """
 
 import math
@@ -25,8 +25,9 @@ _HALF_PI = 0.5 * math.pi
 #: Bit pattern of √½.
 _SQRT_HALF_BITS = 4604544271217802189
 
-# Coefficients, lowest power first (benchmarks.coefficients): of (e^r − 1 − r)/r²; by x² of (1 − cos x)/x²,
-# (x − sin x)/x³ and (x²/2 − 1 + cos x)/x⁴; by x² of arcsin(x)/x; by s² of (2 artanh s − 2s)/s³, a series
+# Coefficients, lowest power first (benchmarks.coefficients): of (e^r − 1 − r)/r²; by x² of (1 − cos
+# x)/x², (x − sin x)/x³ and (x²/2 − 1 + cos x)/x⁴; by x² of arcsin(x)/x; by s² of (2 artanh s −
+# 2s)/s³, a series
 _EXP = (
     0.5, 0.16666666666666669, 0.04166666666662413, 0.008333333333330062, 0.0013888888917213717,
     0.00019841269863053618, 2.4801521295954376e-05, 2.7557268459997064e-06, 2.7620088445409746e-07,
@@ -68,7 +69,8 @@ def _polynomial(x: float, coefficients: tuple[float, ...]) -> float:
 def exp(x: float) -> float:
     """e^x for -708 ≤ x ≤ 709, held at the ends beyond them.
 
-    Range reduction to |r| ≤ ln 2 / 2 (e^r within 2e-17); exponent by shifting the rounded quotient's low bits to it.
+    Range reduction to |r| ≤ ln 2 / 2 (e^r within 2e-17); exponent by shifting the rounded
+    quotient's low bits to it.
     """
     x = min(max(x, _EXP_MIN), _EXP_MAX)
     rounded = x * _LOG2_E + _ROUND
@@ -125,7 +127,8 @@ def log(x: float) -> float:
     """
     bits = np.float64(x).view(np.int64)
     exponent = (bits - _SQRT_HALF_BITS) >> 52
-    k, m = exponent * 1.0, np.int64(bits - (exponent << 52)).view(np.float64)
+    k = exponent * 1.0
+    m = np.int64(bits - (exponent << 52)).view(np.float64)
     s = (m - 1.0) / (m + 1.0)
     z = s * s
     p = _polynomial(z, _LOG)

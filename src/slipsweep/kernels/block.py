@@ -1,8 +1,9 @@
 """The block that all kernels move: its parameters, its validity, and Eq. 4 with its friction.
 
-Time enters the motion only through the phase φ = ωt.  The kernels work in phase: rates of velocity are accelerations
-(m/s² a radian), and a velocity V and a displacement W of theirs, both in m/s², belong to v = V/ω and u = W/ω².  Under
-a record time stands in place of the phase, and V and W are v and u.
+Time enters the motion only through the phase φ = ωt.  The kernels work in phase: rates of velocity
+are accelerations (m/s² a radian), and a velocity V and a displacement W of theirs, both in m/s²,
+belong to v = V/ω and u = W/ω².  Under a record time stands in place of the phase, and V and W are v
+and u.
 """
 
 import math
@@ -17,10 +18,13 @@ from slipsweep.model.friction import FrictionLaw
 from slipsweep.model.variables import VALUELESS, Validity
 
 #: How the block's acceleration rises with the base's (the `model` and `rise` options).
-NEWMARK, MONOTONE, LITERAL = 0, 1, 2
+NEWMARK = 0
+MONOTONE = 1
+LITERAL = 2
 
 #: How the block recouples (the `recoupling` option).
-EQ12, INTEGRATE = 0, 1
+EQ12 = 0
+INTEGRATE = 1
 
 STATICALLY_UNSTABLE = int(Validity.STATICALLY_UNSTABLE)
 UPLIFT = int(Validity.UPLIFT)
@@ -89,8 +93,8 @@ class Block(NamedTuple):
 class Motion(NamedTuple):
     """What a kernel finds of a cell: rows of its array of results.
 
-    A further result is a further field here, filled in by the kernels and named in `model.variables`.  Codes and
-    counts are whole numbers; the counts are those of records.
+    A further result is a further field here, filled in by the kernels and named in
+    `model.variables`.  Codes and counts are whole numbers; the counts are those of records.
     """
 
     displacement: float
@@ -120,8 +124,12 @@ def remarks_on(cell: Cell, ratio: float) -> int:
 def interface_of(cell: Cell, rise: int, g: float) -> Interface:
     """Üy and Eqs. 7-11 of a cell: estimates, and what is given in their place."""
     # without branches, so that a loop over cells becomes SIMD
-    tan_theta, mu_s, amplitude = cell.tan_theta, cell.mu_s, cell.amplitude
-    yield_acceleration = given_or(cell.yield_acceleration, eq.coulomb_yield_acceleration(mu_s, tan_theta, g))
+    tan_theta = cell.tan_theta
+    mu_s = cell.mu_s
+    amplitude = cell.amplitude
+    yield_acceleration = given_or(
+        cell.yield_acceleration, eq.coulomb_yield_acceleration(mu_s, tan_theta, g)
+    )
     limit = eq.limiting_acceleration(yield_acceleration, mu_s, tan_theta, g)
     ratio = eq.acceleration_ratio(amplitude, limit)
     minimum_friction = given_or(cell.minimum_friction, eq.minimum_friction(mu_s, ratio))
@@ -132,7 +140,11 @@ def interface_of(cell: Cell, rise: int, g: float) -> Interface:
     uplift = (amplitude * tan_theta >= g) & (not newmark)
     undefined = (eq.limit_denominator(mu_s, tan_theta) <= 0.0) & (not newmark)
     # λ <= 0, said without the division by an amplitude that may be zero
-    rises = math.isnan(cell.decay_rate) & (mu_s + delta_mu <= minimum_friction) & (not (unstable | undefined | newmark))
+    rises = (
+        math.isnan(cell.decay_rate)
+        & (mu_s + delta_mu <= minimum_friction)
+        & (not (unstable | undefined | newmark))
+    )
     validity = (
         (STATICALLY_UNSTABLE if unstable else 0)
         | (UPLIFT if uplift else 0)
@@ -148,17 +160,28 @@ def interface_of(cell: Cell, rise: int, g: float) -> Interface:
 @inlined
 def decay_rate_of(cell: Cell, delta_mu: float, minimum_friction: float, g: float) -> float:
     """λ, given or from Eq. 6 at the peak."""
-    return given_or(cell.decay_rate, eq.decay_rate(cell.amplitude, cell.mu_s, delta_mu, minimum_friction, g))
+    return given_or(
+        cell.decay_rate, eq.decay_rate(cell.amplitude, cell.mu_s, delta_mu, minimum_friction, g)
+    )
 
 
 @inlined
-def block_of(law: FrictionLaw, amplitude: float, cell: Cell, interface: Interface, options: Options) -> Block:
+def block_of(
+    law: FrictionLaw, amplitude: float, cell: Cell, interface: Interface, options: Options
+) -> Block:
     """A cell's block, λ from Eq. 6 where it is not given; the base's acceleration is the `amplitude` times w."""
     decay_rate = decay_rate_of(cell, interface.delta_mu, interface.minimum_friction, options.g)
     return Block(
-        amplitude, interface.yield_acceleration, cell.mu_s, cell.tan_theta, interface.delta_mu, decay_rate, options.g,
-        options.rise, law,
-    )  # fmt: skip
+        amplitude,
+        interface.yield_acceleration,
+        cell.mu_s,
+        cell.tan_theta,
+        interface.delta_mu,
+        decay_rate,
+        options.g,
+        options.rise,
+        law,
+    )
 
 
 @inlined
@@ -184,7 +207,8 @@ def store(found: Motion, j: int, results: np.ndarray) -> None:
         results[row, j] = found[row]
 
 
-# ------------------------------------------------------------------ Eq. 4 with the friction of a block
+# ------------------------------------------------------------------ Eq. 4 with the friction of a
+# block
 
 
 @inlined
@@ -222,7 +246,11 @@ def slopes(block: Block, x: float) -> tuple[float, float, float]:
     first, second = block.law.derivatives(mu, block.decay_rate, block.g)
     slope = eq.relative_acceleration_slope(x, mu, first, block.mu_s, block.tan_theta, block.g)
     curvature = eq.relative_acceleration_curvature(x, first, second, block.tan_theta, block.g)
-    return eq.block_acceleration(x, mu, block.mu_s, block.tan_theta, block.g), 1.0 - slope, -curvature
+    return (
+        eq.block_acceleration(x, mu, block.mu_s, block.tan_theta, block.g),
+        1.0 - slope,
+        -curvature,
+    )
 
 
 @scalar
@@ -274,7 +302,8 @@ def slope_root(block: Block, level: float, start: float, end: float) -> float:
 @scalar
 def relative_acceleration_root(block: Block, start: float, end: float) -> float:
     """x between start and end at which D = 0, whose sign changes."""
-    # friction is back at μs there, and most D are near 0: from the end Newton's steps would leave the bracket
+    # friction is back at μs there, and most D are near 0: from the end Newton's steps would leave
+    # the bracket
     at_static = block.law.static_acceleration(block.mu_s, block.delta_mu, block.decay_rate, block.g)
     static = math.copysign(at_static, end)
     first = static if min(start, end) < static < max(start, end) else end

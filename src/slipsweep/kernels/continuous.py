@@ -34,7 +34,10 @@ def zeros_on_one_side(block: Block, end: float, zeros: np.ndarray) -> int:
     for _ in range(MOST_STAGES):
         target = next_break(block, x, end)
         inner = inside(x, target)
-        if physics.opposite(physics.relative_acceleration(block, inner), physics.relative_acceleration(block, target)):
+        if physics.opposite(
+            physics.relative_acceleration(block, inner),
+            physics.relative_acceleration(block, target),
+        ):
             zeros[count] = physics.relative_acceleration_root(block, inner, target)
             if math.isnan(zeros[count]):
                 return -1
@@ -57,11 +60,16 @@ def find_zeros(block: Block, wants_peak: bool, wave: Wave, workspace: Workspace)
 
 
 @inlined
-def most_gained(block: Block, wave: Wave, q: int, start: float, end: float, workspace: Workspace) -> float:
+def most_gained(
+    block: Block, wave: Wave, q: int, start: float, end: float, workspace: Workspace
+) -> float:
     """The most that V gains on a part of piece q up to a zero of D (−∞, if it has none)."""
-    pieces, amplitude, highest = wave.pieces, block.amplitude, -math.inf
+    pieces = wave.pieces
+    amplitude = block.amplitude
+    highest = -math.inf
     side = 0 if pieces[q].top > 0.0 else 1
-    first, last = amplitude * pieces[q].first, amplitude * pieces[q].last
+    first = amplitude * pieces[q].first
+    last = amplitude * pieces[q].last
     for i in range(workspace.zero_counts[side]):
         zero = workspace.zeros[side, i]
         if min(first, last) < zero < max(first, last):
@@ -74,25 +82,47 @@ def most_gained(block: Block, wave: Wave, q: int, start: float, end: float, work
 @scalar
 def follow_eq4(
     block: Block, wave: Wave, workspace: Workspace, p: int, tau: float, until: int, tau_until: float
-) -> Gain:  # fmt: skip
+) -> Gain:
     """Eq. 4 from rest, τ on piece p, to `tau_until` on piece `until`, by `lag_integrals`; a log has its parts."""
-    pieces, log, logged = wave.pieces, workspace.log, 0
-    velocity, displacement, peak = 0.0, 0.0, 0.0
+    pieces = wave.pieces
+    log = workspace.log
+    logged = 0
+    velocity = 0.0
+    displacement = 0.0
+    peak = 0.0
     # apart, because over a symmetric cycle they cancel to the last digit
-    above, below, both = 0.0, 0.0, 0.0
+    above = 0.0
+    below = 0.0
+    both = 0.0
     for q in range(p, min(until + 1, pieces.shape[0])):
-        start, end = tau if q == p else pieces[q].begin, tau_until if q == until else pieces[q].finish
+        start = tau if q == p else pieces[q].begin
+        end = tau_until if q == until else pieces[q].finish
         if not end > start:
             continue
         if log.size:
-            begins, ends = phase_at(pieces[q], start), phase_at(pieces[q], end)
-            exact.note(log[logged], exact.SLIDE_ON, q, start, begins, ends, math.nan, velocity, displacement)
+            begins = phase_at(pieces[q], start)
+            ends = phase_at(pieces[q], end)
+            exact.note(
+                log[logged],
+                exact.SLIDE_ON,
+                q,
+                start,
+                begins,
+                ends,
+                math.nan,
+                velocity,
+                displacement,
+            )
             logged += 1
         peak = max(peak, velocity + most_gained(block, wave, q, start, end, workspace))
-        lag, upper = lag_integrals(block, pieces[q], start, end), pieces[q].top > 0.0
+        lag = lag_integrals(block, pieces[q], start, end)
+        upper = pieces[q].top > 0.0
         side_g = block.g if upper else -block.g
-        displacement += velocity * (end - start) + side_g * lag.second + block.tan_theta * lag.second_x
-        above, below = above + (lag.first if upper else 0.0), below + (0.0 if upper else lag.first)
+        displacement += (
+            velocity * (end - start) + side_g * lag.second + block.tan_theta * lag.second_x
+        )
+        above = above + (lag.first if upper else 0.0)
+        below = below + (0.0 if upper else lag.first)
         both += lag.first_x
         velocity = block.g * (above - below) + block.tan_theta * both
         peak = max(peak, velocity)
@@ -101,7 +131,9 @@ def follow_eq4(
 
 
 @scalar
-def _follow_cycle(block: Block, wave: Wave, workspace: Workspace, c: int, p: int, tau: float) -> Gain:
+def _follow_cycle(
+    block: Block, wave: Wave, workspace: Workspace, c: int, p: int, tau: float
+) -> Gain:
     return follow_eq4(block, wave, workspace, p, tau, wave.cycle[c + 1], -math.inf)
 
 

@@ -1,7 +1,7 @@
 """Gains of V and W where the block follows Eq. 4 along a part of a piece: closed forms, or quadrature.
 
-The relative acceleration is D = ±g (μs − μ) + tan θ |x| (μs − tan θ − μ) on the side ±1 of Üg = 0, x = Üg.
-docs/numerics.md#straight-pieces and docs/numerics.md#curved-pieces
+The relative acceleration is D = ±g (μs − μ) + tan θ |x| (μs − tan θ − μ) on the side ±1 of Üg = 0,
+x = Üg. docs/numerics.md#straight-pieces and docs/numerics.md#curved-pieces
 """
 
 import math
@@ -15,8 +15,8 @@ from slipsweep.kernels.block import Block, friction
 from slipsweep.kernels.excitation import base_acceleration, offset_at
 from slipsweep.motion.pieces import NODES, WEIGHTS, Piece
 
-#: Where panels of the quadrature end, in e-foldings of the friction from the end where it is larger;
-#: past the third it has decayed to 1e-18.
+#: Where panels of the quadrature end, in e-foldings of the friction from the end where it is
+#: larger; past the third it has decayed to 1e-18.
 PANEL_BOUNDS = (6.0, 18.0, 42.0, math.inf)
 
 
@@ -35,7 +35,9 @@ class Lag(NamedTuple):
 @scalar
 def straight_lag(block: Block, x: float, change: float, width: float) -> Lag:
     """`Lag` where |Üg| goes along a straight line, by `change`: closed forms of the law's moments."""
-    whole, early, late, both = block.law.moments(x, change, block.mu_s, block.delta_mu, block.decay_rate, block.g)
+    whole, early, late, both = block.law.moments(
+        x, change, block.mu_s, block.delta_mu, block.decay_rate, block.g
+    )
     kept = block.mu_s - block.tan_theta
     return Lag(
         (block.mu_s - whole) * width,
@@ -48,7 +50,8 @@ def straight_lag(block: Block, x: float, change: float, width: float) -> Lag:
 @scalar
 def at_nodes(piece: Piece, amplitude: float, start: float, width: float) -> np.ndarray:
     """|Üg| at the nodes of the quadrature from `start` on: power by power, so that LLVM takes nodes together."""
-    top, x = piece.top, np.zeros(NODES.size)
+    top = piece.top
+    x = np.zeros(NODES.size)
     if piece.arc:
         for node in range(NODES.size):
             x[node] = amplitude * (1.0 - versine(start + width * NODES[node]))
@@ -66,14 +69,20 @@ def at_nodes(piece: Piece, amplitude: float, start: float, width: float) -> np.n
 def panel_lag(block: Block, piece: Piece, near: float, until: float, end: float) -> Lag:
     """`Lag` over a panel of the quadrature: 16 nodes of Gauss and Legendre."""
     width = until - near
-    x, mu = at_nodes(piece, block.amplitude, near, width), np.empty(NODES.size)
+    x = at_nodes(piece, block.amplitude, near, width)
+    mu = np.empty(NODES.size)
     for node in range(NODES.size):  # alone, so that LLVM takes nodes together
         mu[node] = friction(block, x[node])
     kept = block.mu_s - block.tan_theta
-    first, second, first_x, second_x = 0.0, 0.0, 0.0, 0.0
+    first = 0.0
+    second = 0.0
+    first_x = 0.0
+    second_x = 0.0
     for node in range(NODES.size):
-        weight, left = abs(width) * WEIGHTS[node], end - (near + width * NODES[node])
-        rate, rate_x = weight * (block.mu_s - mu[node]), weight * x[node] * (kept - mu[node])
+        weight = abs(width) * WEIGHTS[node]
+        left = end - (near + width * NODES[node])
+        rate = weight * (block.mu_s - mu[node])
+        rate_x = weight * x[node] * (kept - mu[node])
         first += rate
         second += left * rate
         first_x += rate_x
@@ -82,7 +91,9 @@ def panel_lag(block: Block, piece: Piece, near: float, until: float, end: float)
 
 
 @scalar
-def curved_lag(block: Block, piece: Piece, start: float, end: float, x_start: float, x_end: float) -> Lag:
+def curved_lag(
+    block: Block, piece: Piece, start: float, end: float, x_start: float, x_end: float
+) -> Lag:
     """`Lag` where |Üg| goes along a curve, panel by panel from the end where the friction is larger."""
     length = block.law.decay_length(block.decay_rate, block.g)
     e_foldings = abs(x_end - x_start) / length
@@ -92,7 +103,9 @@ def curved_lag(block: Block, piece: Piece, start: float, end: float, x_start: fl
     for bound in PANEL_BOUNDS:
         until = far
         if e_foldings > bound:
-            until = offset_at(piece, block.amplitude, math.copysign(least + bound * length, piece.top))
+            until = offset_at(
+                piece, block.amplitude, math.copysign(least + bound * length, piece.top)
+            )
         panel = panel_lag(block, piece, near, until, end)
         lag = Lag(
             lag.first + panel.first,
@@ -111,9 +124,16 @@ def lag_integrals(block: Block, piece: Piece, start: float, end: float) -> Lag:
     """`Lag` over a part of piece p."""
     amplitude = block.amplitude
     # most parts begin or end where the piece does
-    x_start = amplitude * piece.first if start == piece.begin else base_acceleration(piece, amplitude, start)
-    x_end = amplitude * piece.last if end == piece.finish else base_acceleration(piece, amplitude, end)
-    x_start, x_end = abs(x_start), abs(x_end)
+    x_start = (
+        amplitude * piece.first
+        if start == piece.begin
+        else base_acceleration(piece, amplitude, start)
+    )
+    x_end = (
+        amplitude * piece.last if end == piece.finish else base_acceleration(piece, amplitude, end)
+    )
+    x_start = abs(x_start)
+    x_end = abs(x_end)
     if piece.degree <= 1:
         return straight_lag(block, x_start, x_end - x_start, end - start)
     return curved_lag(block, piece, start, end, x_start, x_end)
@@ -124,4 +144,7 @@ def eq4_integrals(block: Block, piece: Piece, start: float, end: float) -> tuple
     """∫ D dτ and ∫ (end − τ) D dτ over a part of piece p: gains of V and W from rest, after Eq. 4."""
     lag = lag_integrals(block, piece, start, end)
     side_g = math.copysign(block.g, piece.top)
-    return side_g * lag.first + block.tan_theta * lag.first_x, side_g * lag.second + block.tan_theta * lag.second_x
+    return (
+        side_g * lag.first + block.tan_theta * lag.first_x,
+        side_g * lag.second + block.tan_theta * lag.second_x,
+    )

@@ -1,8 +1,9 @@
 """Events: where something of the motion passes zero.  The one root finder of the kernels.
 
-It is Newton's iteration, kept in a bracket, which is halved where Newton's steps would leave it or come to no end.  A
-root that is not found is NaN, and so is then the displacement: the run ends with an error that names the cell
-(`block.UNSOLVED`).  Why an event's error hardly matters: docs/numerics.md#finding-events.
+It is Newton's iteration, kept in a bracket, which is halved where Newton's steps would leave it or
+come to no end.  A root that is not found is NaN, and so is then the displacement: the run ends with
+an error that names the cell (`block.UNSOLVED`).  Why an event's error hardly matters:
+docs/numerics.md#finding-events.
 """
 
 import math
@@ -11,15 +12,15 @@ from typing import Any
 
 from slipsweep.jit.decorators import scalar
 
-#: Relative size of the last step to an event: the error left is its square, and at most events enters the
-#: result squared again.
+#: Relative size of the last step to an event: the error left is its square, and at most events
+#: enters the result squared again.
 EVENT_TOLERANCE = 1e-9
 
 #: Steps of `root_of`: as many halvings reach 1e-60 of the bracket.
 _MOST_STEPS = 200
 
-#: A root so close to the origin, as a part of the bracket, lies there.  Newton's iteration comes to a
-#: double one by halves.
+#: A root so close to the origin, as a part of the bracket, lies there.  Newton's iteration comes to
+#: a double one by halves.
 _AT_ORIGIN = 1e-30
 
 
@@ -43,10 +44,14 @@ def root_of(value_and_slope: Callable[[Any, float], tuple[float, float]]) -> Cal
             else:
                 below = x
             new = x - value / slope
-            # halved, too, where two steps are not half as long as the two before: Newton's may go to and fro
-            if not (min(below, above) <= new <= max(below, above) and 2.0 * abs(new - x) <= before_last):
+            # halved, too, where two steps are not half as long as the two before: Newton's may go
+            # to and fro
+            if not (
+                min(below, above) <= new <= max(below, above) and 2.0 * abs(new - x) <= before_last
+            ):
                 new = 0.5 * (below + above)
-            last, before_last = abs(new - x), last
+            before_last = last
+            last = abs(new - x)
             x = new
             if last <= EVENT_TOLERANCE * abs(x - origin):
                 return x

@@ -1,9 +1,10 @@
 """One pulse from event to event, for waves and records: the exact walk.
 
-While the base's acceleration Üg rises, the block sticks until t1 (`onset`), then slides in stages that end at events
-(`next_stage`): its acceleration b is held, or follows Eq. 4.  While Üg falls b is held (`hold`); from Üg = 0 (t5) on
-Eq. 12 takes V down, or b is held on (`recouple`).  Each stage is integrated in closed form, or by quadrature to
-rounding (`eq4`).  docs/numerics.md#onset-and-switch and docs/numerics.md#stop
+While the base's acceleration Üg rises, the block sticks until t1 (`onset`), then slides in stages
+that end at events (`next_stage`): its acceleration b is held, or follows Eq. 4.  While Üg falls b
+is held (`hold`); from Üg = 0 (t5) on Eq. 12 takes V down, or b is held on (`recouple`).  Each stage
+is integrated in closed form, or by quadrature to rounding (`eq4`).
+docs/numerics.md#onset-and-switch and docs/numerics.md#stop
 """
 
 import math
@@ -17,37 +18,52 @@ from slipsweep.kernels import linear
 from slipsweep.kernels.block import Block
 from slipsweep.kernels.eq4 import eq4_integrals
 from slipsweep.kernels.events import root_of
-from slipsweep.kernels.excitation import base_acceleration, held_gain, held_integrals, offset_at, phase_at
+from slipsweep.kernels.excitation import (
+    base_acceleration,
+    held_gain,
+    held_integrals,
+    offset_at,
+    phase_at,
+)
 from slipsweep.kernels.pulse import Pulse, beginning, rises_anew
 from slipsweep.model import equations as eq
 from slipsweep.motion.pieces import Piece, Wave
 
-#: The signs of a stage are read `_SLIVER` of its length behind its start, and `_ROUNDING` times |Üg| at least: at the
-#: start itself, which may be a root, the sign is rounding.
-_SLIVER, _ROUNDING = 1e-10, 4.5e-16
+#: The signs of a stage are read `_SLIVER` of its length behind its start, and `_ROUNDING` times
+#: |Üg| at least: at the start itself, which may be a root, the sign is rounding.
+_SLIVER = 1e-10
+_ROUNDING = 4.5e-16
 
-#: More stages than any rise has: five places where E, dE/dx or D turn, and a stop and an onset between each.
+#: More stages than any rise has: five places where E, dE/dx or D turn, and a stop and an onset
+#: between each.
 MOST_STAGES = 32
 
-#: Kinds of motion in a log of it: b held, b by Eq. 4, Eq. 12, and b by Eq. 4 whatever the sign of V.
+#: Kinds of motion in a log of it: b held, b by Eq. 4, Eq. 12, and b by Eq. 4 whatever the sign of
+#: V.
 HOLD, FOLLOW, ATTENUATE, SLIDE_ON = range(4)
 
-#: A log of the motion, for time histories: its kind, the piece, τ and phase where it starts, phase at the end, and b, V
-#: and W at the start.
+#: A log of the motion, for time histories: its kind, the piece, τ and phase where it starts, phase
+#: at the end, and b, V and W at the start.
 LOG = np.dtype(
     [
-        ("kind", "i8"), ("piece", "i8"), ("tau", "f8"), ("start", "f8"), ("end", "f8"),
-        ("held", "f8"), ("velocity", "f8"), ("displacement", "f8"),
+        ("kind", "i8"),
+        ("piece", "i8"),
+        ("tau", "f8"),
+        ("start", "f8"),
+        ("end", "f8"),
+        ("held", "f8"),
+        ("velocity", "f8"),
+        ("displacement", "f8"),
     ]
-)  # fmt: skip
+)
 
 
 class Workspace(NamedTuple):
     """What the exact kernels write into, one for all cells.
 
-    `log` has one row for each part of a pulse if a history is requested, else none, and `logged`, (1,), is how many
-    are in use; `zeros`, (2, MOST_STAGES), is for zeros of D on either side of Üg = 0, and `zero_counts`, (2,), for how
-    many there are (`continuous`).
+    `log` has one row for each part of a pulse if a history is requested, else none, and `logged`,
+    (1,), is how many are in use; `zeros`, (2, MOST_STAGES), is for zeros of D on either side of Üg
+    = 0, and `zero_counts`, (2,), for how many there are (`continuous`).
     """
 
     log: np.ndarray
@@ -59,8 +75,8 @@ class Workspace(NamedTuple):
 class State(NamedTuple):
     """The block in a pulse: V, W since its beginning, its acceleration b (`held`), and whether it slides.
 
-    While it slides b is constant, or as last taken from Eq. 4.  Besides: the largest and the least V, slides that
-    began from rest, and the rows of the log.
+    While it slides b is constant, or as last taken from Eq. 4.  Besides: the largest and the least
+    V, slides that began from rest, and the rows of the log.
     """
 
     velocity: float
@@ -108,53 +124,101 @@ def workspace_of(wave: Wave, keeps_log: bool = False) -> Workspace:
 def uncounted_workspace(workspace: Workspace) -> Workspace:
     """The same workspace (`decorators.uncounted`)."""
     return Workspace(
-        uncounted(workspace.log), uncounted(workspace.logged), uncounted(workspace.zeros),
+        uncounted(workspace.log),
+        uncounted(workspace.logged),
+        uncounted(workspace.zeros),
         uncounted(workspace.zero_counts),
-    )  # fmt: skip
+    )
 
 
 @inlined
 def with_held(state: State, held: float) -> State:
     """The state with another b."""
     return State(
-        state.velocity, state.displacement, held, state.sliding, state.peak, state.least, state.slips, state.logged
+        state.velocity,
+        state.displacement,
+        held,
+        state.sliding,
+        state.peak,
+        state.least,
+        state.slips,
+        state.logged,
     )
 
 
 @inlined
 def begun(state: State, held: float) -> State:
     """The state of a block at rest that begins to slide (t1)."""
-    return State(0.0, state.displacement, held, True, state.peak, state.least, state.slips + 1.0, state.logged)
+    return State(
+        0.0,
+        state.displacement,
+        held,
+        True,
+        state.peak,
+        state.least,
+        state.slips + 1.0,
+        state.logged,
+    )
 
 
 @inlined
 def state_after(
     state: State, part: Part, kind: int, pieces: np.ndarray, p: int, start: float, log: np.ndarray
-) -> State:  # fmt: skip
+) -> State:
     """The state after a part of a slide along piece p from τ = `start` on; the log has it, if one is kept."""
     logged = state.logged
     if log.size:
-        begins, ends = phase_at(pieces[p], start), phase_at(pieces[p], part.end)
-        note(log[logged], kind, p, start, begins, ends, state.held, state.velocity, state.displacement)
+        begins = phase_at(pieces[p], start)
+        ends = phase_at(pieces[p], part.end)
+        note(
+            log[logged],
+            kind,
+            p,
+            start,
+            begins,
+            ends,
+            state.held,
+            state.velocity,
+            state.displacement,
+        )
         logged += 1
     return State(
-        part.velocity, state.displacement + part.displacement, state.held, not part.stops,
-        np.maximum(part.peak, state.peak), min(part.least, state.least),  # NaN is kept
-        state.slips, logged,
-    )  # fmt: skip
+        part.velocity,
+        state.displacement + part.displacement,
+        state.held,
+        not part.stops,
+        np.maximum(part.peak, state.peak),
+        min(part.least, state.least),  # NaN is kept
+        state.slips,
+        logged,
+    )
 
 
 @scalar
 def note(
-    row: np.record, kind: int, piece: int, tau: float, start: float, end: float, held: float, velocity: float,
+    row: np.record,
+    kind: int,
+    piece: int,
+    tau: float,
+    start: float,
+    end: float,
+    held: float,
+    velocity: float,
     displacement: float,
-) -> None:  # fmt: skip
+) -> None:
     """Write a part of the motion into a row of a log (`LOG`)."""
-    row["kind"], row["piece"], row["tau"], row["start"], row["end"] = kind, piece, tau, start, end
-    row["held"], row["velocity"], row["displacement"] = held, velocity, displacement
+    row["kind"] = kind
+    row["piece"] = piece
+    row["tau"] = tau
+    row["start"] = start
+    row["end"] = end
+    row["held"] = held
+    row["velocity"] = velocity
+    row["displacement"] = displacement
 
 
-# ------------------------------------------------------------------ Eq. 4 on the rise, as a function of Üg alone
+# ------------------------------------------------------------------ Eq. 4 on the rise, as a
+# function of Üg alone
 
 
 @inlined
@@ -170,7 +234,8 @@ def next_break(block: Block, x: float, end: float) -> float:
     inner = inside(x, end)
     if 0.0 < inner < physics.inflection(block):
         end = min(physics.inflection(block), end)
-    before, after = physics.slopes(block, inner)[1], physics.slopes(block, end)[1]
+    before = physics.slopes(block, inner)[1]
+    after = physics.slopes(block, end)[1]
     # dE/dx passes 1 where D turns and 0 where E turns; the one nearer to `before` comes first
     for turn in (1.0, 0.0) if before > after else (0.0, 1.0):
         if min(before, after) < turn < max(before, after):
@@ -200,8 +265,9 @@ def onset(block: Block, x: float, top: float) -> float:
 def next_stage(block: Block, x: float, top: float, held: float, follows: bool) -> RiseStage:
     """The next stage of a slide on the rise from x to `top`; what `rise` does is decided here.
 
-    Newmark: b = Üy to the top.  Literal: b = Eq. 4 throughout.  Monotone: b = max(b, Eq. 4), held until Eq. 4 comes to
-    it, followed until Eq. 4 falls.  A stage that follows Eq. 4 ends where D changes its sign, too.
+    Newmark: b = Üy to the top.  Literal: b = Eq. 4 throughout.  Monotone: b = max(b, Eq. 4), held
+    until Eq. 4 comes to it, followed until Eq. 4 falls.  A stage that follows Eq. 4 ends where D
+    changes its sign, too.
     """
     if block.rise == physics.NEWMARK:
         return RiseStage(top, False, False)
@@ -214,10 +280,14 @@ def next_stage(block: Block, x: float, top: float, held: float, follows: bool) -
     eq4, slope, _ = physics.slopes(block, inner)
     follows = block.rise == physics.LITERAL or (slope > 0.0 and (follows or eq4 >= held))
     if follows:
-        if not bends:  # E is convex, D concave: it may be positive between two places where it is not
+        if (
+            not bends
+        ):  # E is convex, D concave: it may be positive between two places where it is not
             end = next_break(block, x, top)
             inner = inside(x, end)
-        if physics.opposite(physics.relative_acceleration(block, inner), physics.relative_acceleration(block, end)):
+        if physics.opposite(
+            physics.relative_acceleration(block, inner), physics.relative_acceleration(block, end)
+        ):
             end = physics.relative_acceleration_root(block, inner, end)
         return RiseStage(end, True, True)
     crosses = physics.response(block, end) > held
@@ -244,7 +314,9 @@ def _followed_lost(where: tuple[Block, Piece, float, float], tau: float) -> tupl
     """−V at τ where b follows Eq. 4, and its rate."""
     block, piece, velocity, start = where
     left = velocity + eq4_integrals(block, piece, start, tau)[0]
-    return -left, -physics.relative_acceleration(block, base_acceleration(piece, block.amplitude, tau))
+    return -left, -physics.relative_acceleration(
+        block, base_acceleration(piece, block.amplitude, tau)
+    )
 
 
 _held_stop = root_of(_held_lost)
@@ -262,19 +334,33 @@ def hold_integrals(
 
 
 @inlined
-def hold(piece: Piece, amplitude: float, held: float, velocity: float, start: float, end: float) -> Part:
+def hold(
+    piece: Piece, amplitude: float, held: float, velocity: float, start: float, end: float
+) -> Part:
     """Slide with b held, V' = Üg − b, along a piece from start to end, or to the stop."""
     # most parts are whole pieces, whose ends are known
-    x = amplitude * piece.first if start == piece.begin else base_acceleration(piece, amplitude, start)
-    x_end = amplitude * piece.last if end == piece.finish else base_acceleration(piece, amplitude, end)
-    rate, rate_end = x - held, x_end - held
-    slope, straight = amplitude * piece.coefficients[0], piece.degree <= 1
+    x = (
+        amplitude * piece.first
+        if start == piece.begin
+        else base_acceleration(piece, amplitude, start)
+    )
+    x_end = (
+        amplitude * piece.last if end == piece.finish else base_acceleration(piece, amplitude, end)
+    )
+    rate = x - held
+    rate_end = x_end - held
+    slope = amplitude * piece.coefficients[0]
+    straight = piece.degree <= 1
     gained, displaced = hold_integrals(piece, amplitude, held, rate, start, end)
-    low, high, peak, least = start, end, velocity, velocity
+    low = start
+    high = end
+    peak = velocity
+    least = velocity
     stops = velocity + gained <= 0.0
     if rate_end >= 0.0 and (rate >= 0.0 or velocity <= 0.0):
         # nothing slows it: over a part so short that its gain is rounding, it does not stop
-        stops, gained = False, max(gained, 0.0)
+        stops = False
+        gained = max(gained, 0.0)
     if physics.opposite(rate, rate_end) and (rate > 0.0 or velocity > 0.0):
         # V turns where x = b; one that starts from rest there only seems to fall, by rounding
         if straight:
@@ -288,7 +374,8 @@ def hold(piece: Piece, amplitude: float, held: float, velocity: float, start: fl
             low = turn
         else:
             least = min(extreme, least)
-            stops, high = extreme <= 0.0, turn
+            stops = extreme <= 0.0
+            high = turn
     if stops:
         end = start
         if velocity > 0.0 or rate > 0.0:
@@ -299,7 +386,9 @@ def hold(piece: Piece, amplitude: float, held: float, velocity: float, start: fl
                 end = _held_stop(where, low, high, 0.5 * (low + high), start)
         displaced = hold_integrals(piece, amplitude, held, rate, start, end)[1]
     last = 0.0 if stops else velocity + gained
-    return Part(end, last, velocity * (end - start) + displaced, max(peak, last), min(least, last), stops)
+    return Part(
+        end, last, velocity * (end - start) + displaced, max(peak, last), min(least, last), stops
+    )
 
 
 @inlined
@@ -309,7 +398,10 @@ def follow(block: Block, piece: Piece, velocity: float, start: float, end: float
     last = velocity + gained
     stops = last <= 0.0
     if stops:
-        end, last = _followed_stop((block, piece, velocity, start), start, end, 0.5 * (start + end), start), 0.0
+        end = _followed_stop(
+            (block, piece, velocity, start), start, end, 0.5 * (start + end), start
+        )
+        last = 0.0
         displaced = eq4_integrals(block, piece, start, end)[1]
     moved = velocity * (end - start) + displaced
     return Part(end, last, moved, max(last, velocity), min(last, velocity), stops)
@@ -319,7 +411,9 @@ def follow(block: Block, piece: Piece, velocity: float, start: float, end: float
 
 
 @inlined
-def place_of(block: Block, pieces: np.ndarray, x: float, p: int, tau: float, last: int) -> tuple[int, float]:
+def place_of(
+    block: Block, pieces: np.ndarray, x: float, p: int, tau: float, last: int
+) -> tuple[int, float]:
     """Where on the rise from τ on piece p to the end of piece `last` the base's acceleration comes to x."""
     while p < last and block.amplitude * pieces[p].last < x:
         p += 1
@@ -331,10 +425,19 @@ def place_of(block: Block, pieces: np.ndarray, x: float, p: int, tau: float, las
 
 @inlined
 def rise(
-    block: Block, pieces: np.ndarray, first: int, last: int, tau: float, x: float, state: State, log: np.ndarray
-) -> State:  # fmt: skip
+    block: Block,
+    pieces: np.ndarray,
+    first: int,
+    last: int,
+    tau: float,
+    x: float,
+    state: State,
+    log: np.ndarray,
+) -> State:
     """From Üg = x, τ on piece `first`, to the top of the rise at the end of piece `last`, stage by stage."""
-    amplitude, top, p = block.amplitude, block.amplitude * pieces[last].last, first
+    amplitude = block.amplitude
+    top = block.amplitude * pieces[last].last
+    p = first
     follows = block.rise == physics.LITERAL
     for _ in range(MOST_STAGES * (1 + last - first)):
         if not state.sliding:
@@ -345,10 +448,13 @@ def rise(
                 return state
             if began > x:
                 p, tau = place_of(block, pieces, began, p, tau, last)
-            # at an onset beyond Üy Eq. 4 meets Üg: to evaluate it there would add the rounding of g μs
+            # at an onset beyond Üy Eq. 4 meets Üg: to evaluate it there would add the rounding of g
+            # μs
             beyond = began > max(x, block.yield_acceleration)
             b = began if beyond else min(physics.starting_acceleration(block, began), began)
-            state, follows, x = begun(state, b), block.rise == physics.LITERAL, began
+            state = begun(state, b)
+            follows = block.rise == physics.LITERAL
+            x = began
         stage = next_stage(block, x, top, state.held, follows)
         until, tau_until = place_of(block, pieces, stage.end, p, tau, last)
         while True:
@@ -365,15 +471,20 @@ def rise(
             tau = pieces[p].begin
         if not state.sliding and (p < until or tau < tau_until):
             if stage.follows:  # D < 0 up to the end of the stage: no slide begins before
-                p, tau, x = until, tau_until, stage.end
+                p = until
+                tau = tau_until
+                x = stage.end
             else:
                 x = base_acceleration(pieces[p], amplitude, tau)
             continue
-        x, follows = stage.end, stage.follows_after
+        x = stage.end
+        follows = stage.follows_after
         state = with_held(state, physics.response(block, x) if stage.follows else state.held)
         if x >= top:
             return state
-    return State(math.nan, math.nan, state.held, True, math.nan, math.nan, state.slips, state.logged)
+    return State(
+        math.nan, math.nan, state.held, True, math.nan, math.nan, state.slips, state.logged
+    )
 
 
 @inlined
@@ -401,7 +512,13 @@ def end_of_rise(pieces: np.ndarray, p: int, end: int) -> int:
 
 @inlined
 def hold_on(
-    pieces: np.ndarray, p: int, amplitude: float, start: float, end: float, state: State, log: np.ndarray
+    pieces: np.ndarray,
+    p: int,
+    amplitude: float,
+    start: float,
+    end: float,
+    state: State,
+    log: np.ndarray,
 ) -> State:
     """The state after `hold`."""
     part = hold(pieces[p], amplitude, state.held, state.velocity, start, end)
@@ -410,11 +527,19 @@ def hold_on(
 
 @single
 def recouple(
-    block: Block, recoupling: int, pieces: np.ndarray, q: int, p: int, tau: float, state: State, log: np.ndarray
+    block: Block,
+    recoupling: int,
+    pieces: np.ndarray,
+    q: int,
+    p: int,
+    tau: float,
+    state: State,
+    log: np.ndarray,
 ) -> State:
     """From Üg = 0 (t5) at the beginning of piece q to the next pulse, τ on piece p, or to the stop.
 
-    By Eq. 12 with Ümax = b, or with b held on.  p lies past the last piece if there is no next pulse.
+    By Eq. 12 with Ümax = b, or with b held on.  p lies past the last piece if there is no next
+    pulse.
     """
     count = pieces.shape[0]
     started = pieces[q].start if q < count else pieces[q - 1].end
@@ -431,24 +556,52 @@ def recouple(
     logged = state.logged
     if log.size:
         stop = started + min(duration, state.velocity / state.held)
-        note(log[logged], ATTENUATE, 0, 0.0, started, stop, state.held, state.velocity, state.displacement)
+        note(
+            log[logged],
+            ATTENUATE,
+            0,
+            0.0,
+            started,
+            stop,
+            state.held,
+            state.velocity,
+            state.displacement,
+        )
         logged += 1
     velocity = eq.attenuated_velocity(state.velocity, state.held, duration)
-    displacement = state.displacement + eq.attenuated_displacement(state.velocity, state.held, duration)
+    displacement = state.displacement + eq.attenuated_displacement(
+        state.velocity, state.held, duration
+    )
     return State(
-        velocity, displacement, state.held, state.sliding, state.peak, min(state.least, velocity), state.slips, logged
+        velocity,
+        displacement,
+        state.held,
+        state.sliding,
+        state.peak,
+        min(state.least, velocity),
+        state.slips,
+        logged,
     )
 
 
 @single
 def pulse(
-    block: Block, options: physics.Options, wave: Wave, workspace: Workspace, k: int, following: int, velocity: float
+    block: Block,
+    options: physics.Options,
+    wave: Wave,
+    workspace: Workspace,
+    k: int,
+    following: int,
+    velocity: float,
 ) -> Pulse:
     """From Üg = Üy in interval k to that in the `following` one, or to the end of the motion if none follows.
 
-    Up to Üg = 0 (t5) the block sticks until t1, slides as `rise` says while Üg rises and with b held while it falls.
+    Up to Üg = 0 (t5) the block sticks until t1, slides as `rise` says while Üg rises and with b
+    held while it falls.
     """
-    pieces, log, end = wave.pieces, workspace.log, wave.interval[k, 1]
+    pieces = wave.pieces
+    log = workspace.log
+    end = wave.interval[k, 1]
     q, tau = beginning(block, wave, k)
     x = max(block.amplitude * pieces[q].first, block.yield_acceleration)
     state = State(
@@ -472,18 +625,24 @@ def pulse(
         elif state.sliding:
             level = pieces[q].first == pieces[q].last
             least_held = least_held if level else min(least_held, state.held)
-            part = hold(pieces[q], block.amplitude, state.held, state.velocity, tau, pieces[q].finish)
+            part = hold(
+                pieces[q], block.amplitude, state.held, state.velocity, tau, pieces[q].finish
+            )
             state = state_after(state, part, HOLD, pieces, q, tau, log)
             if level and part.stops:
                 state = reset_held(block, pieces, q, x, state)
                 if state.sliding:
-                    state = hold_on(pieces, q, block.amplitude, part.end, pieces[q].finish, state, log)
+                    state = hold_on(
+                        pieces, q, block.amplitude, part.end, pieces[q].finish, state, log
+                    )
         q += 1
-        x, tau = block.amplitude * pieces[min(q, end - 1)].first, pieces[min(q, end - 1)].begin
+        x = block.amplitude * pieces[min(q, end - 1)].first
+        tau = pieces[min(q, end - 1)].begin
     if state.sliding:
         if state.held <= 0.0:
             return Pulse(0.0, math.nan, math.nan, 0.0, state.slips, physics.KD_NOT_POSITIVE)
-        next_p, next_tau = pieces.shape[0], 0.0
+        next_p = pieces.shape[0]
+        next_tau = 0.0
         if following < wave.height.size:
             next_p, next_tau = beginning(block, wave, following)
         state = recouple(block, options.recoupling, pieces, end, next_p, next_tau, state, log)

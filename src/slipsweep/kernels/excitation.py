@@ -2,9 +2,9 @@
 
 On a piece the wave is w = top + c₁τ + c₂τ² + …, where τ is the phase counted from the piece's
 anchor: that end of it at which |w| is larger.  Differences from a peak thus come out of the sum,
-not out of a subtraction of two numbers near 1, and keep their digits however small they are
-(near an anchor with c₁ = 0 they go with τ²).  A straight line is a polynomial, a plateau too, and
-smooth waves are cut so short that the series are exact to rounding (`slipsweep.motion.cutting`, which
+not out of a subtraction of two numbers near 1, and keep their digits however small they are (near
+an anchor with c₁ = 0 they go with τ²).  A straight line is a polynomial, a plateau too, and smooth
+waves are cut so short that the series are exact to rounding (`slipsweep.motion.cutting`, which
 fills the table): one form for all waveforms.  Only the series of a plain sine has a name, and is
 evaluated by its shorter closed forms.  Times the amplitude A it is the base's acceleration x.
 """
@@ -12,7 +12,12 @@ evaluated by its shorter closed forms.  Times the amplitude A it is the base's a
 import math
 
 from slipsweep.jit.decorators import scalar
-from slipsweep.jit.elementary import angle_minus_sine, half_square_minus_versine, inverse_versine, versine
+from slipsweep.jit.elementary import (
+    angle_minus_sine,
+    half_square_minus_versine,
+    inverse_versine,
+    versine,
+)
 from slipsweep.kernels.events import root_of
 from slipsweep.motion.pieces import Piece
 
@@ -33,7 +38,8 @@ def from_top_and_slope(piece: Piece, tau: float) -> tuple[float, float]:
     """w − top and dw/dτ on a piece."""
     if piece.arc:
         return -piece.top * versine(tau), -piece.top * math.sin(tau)
-    sum_, slope = 0.0, 0.0
+    sum_ = 0.0
+    slope = 0.0
     for k in range(piece.degree - 1, -1, -1):
         slope = slope * tau + sum_
         sum_ = sum_ * tau + piece.coefficients[k]
@@ -45,10 +51,12 @@ def integral(piece: Piece, start: float, end: float) -> float:
     """∫ (w − top) dτ over a part of a piece."""
     if piece.arc:
         return -piece.top * (angle_minus_sine(end) - angle_minus_sine(start))
-    sum_start, sum_end = 0.0, 0.0
+    sum_start = 0.0
+    sum_end = 0.0
     for k in range(piece.degree - 1, -1, -1):
         once = piece.once[k]
-        sum_start, sum_end = sum_start * start + once, sum_end * end + once
+        sum_start = sum_start * start + once
+        sum_end = sum_end * end + once
     return sum_end * end * end - sum_start * start * start
 
 
@@ -57,13 +65,23 @@ def integrals(piece: Piece, start: float, end: float) -> tuple[float, float]:
     """∫ (w − top) dτ and ∫ (end − τ)(w − top) dτ over a part of a piece."""
     if piece.arc:
         sine_part = angle_minus_sine(start)
-        remaining = half_square_minus_versine(end) - half_square_minus_versine(start) - sine_part * (end - start)
+        remaining = (
+            half_square_minus_versine(end)
+            - half_square_minus_versine(start)
+            - sine_part * (end - start)
+        )
         return -piece.top * (angle_minus_sine(end) - sine_part), -piece.top * remaining
-    once_start, once_end, twice_start, twice_end = 0.0, 0.0, 0.0, 0.0
+    once_start = 0.0
+    once_end = 0.0
+    twice_start = 0.0
+    twice_end = 0.0
     for k in range(piece.degree - 1, -1, -1):
-        once, twice = piece.once[k], piece.twice[k]
-        once_start, once_end = once_start * start + once, once_end * end + once
-        twice_start, twice_end = twice_start * start + twice, twice_end * end + twice
+        once = piece.once[k]
+        twice = piece.twice[k]
+        once_start = once_start * start + once
+        once_end = once_end * end + once
+        twice_start = twice_start * start + twice
+        twice_end = twice_end * end + twice
     once_start *= start * start
     moment = twice_end * end * end * end - twice_start * start * start * start
     return once_end * end * end - once_start, moment - once_start * (end - start)
@@ -82,7 +100,9 @@ def held_gain(piece: Piece, amplitude: float, held: float, start: float, end: fl
 
 
 @scalar
-def held_integrals(piece: Piece, amplitude: float, held: float, start: float, end: float) -> tuple[float, float]:
+def held_integrals(
+    piece: Piece, amplitude: float, held: float, start: float, end: float
+) -> tuple[float, float]:
     """∫ (x − b) dτ and ∫ (end − τ)(x − b) dτ for a held b on a piece: gains of V and W from rest."""
     width = end - start
     excess = amplitude * piece.top - held

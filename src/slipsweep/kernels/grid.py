@@ -1,6 +1,7 @@
 """Where kernels meet arrays: the cells of a tile, and the kernel of Eqs. 7-11.
 
-A tile is some thousand cells in the order of the grid, gathered by `slipsweep.grid.engine`: an array of dtype `CELL`.
+A tile is some thousand cells in the order of the grid, gathered by `slipsweep.grid.engine`: an
+array of dtype `CELL`.
 """
 
 import numpy as np
@@ -19,18 +20,30 @@ def cell_at(cells: np.ndarray, j: int) -> Cell:
     """Cell j of a tile."""
     own = cells[j]
     return Cell(
-        own.tan_theta, own.mu_s, own.amplitude, own.yield_acceleration, own.decay_rate, own.delta_mu,
+        own.tan_theta,
+        own.mu_s,
+        own.amplitude,
+        own.yield_acceleration,
+        own.decay_rate,
+        own.delta_mu,
         own.minimum_friction,
-    )  # fmt: skip
+    )
 
 
 @single
 def uncounted_wave(wave: Wave) -> Wave:
     """The same wave (`decorators.uncounted`)."""
     return Wave(
-        uncounted(wave.pieces), uncounted(wave.cycle), uncounted(wave.shape), uncounted(wave.interval),
-        uncounted(wave.height), wave.highest, wave.lowest, wave.lead, wave.repeats,
-    )  # fmt: skip
+        uncounted(wave.pieces),
+        uncounted(wave.cycle),
+        uncounted(wave.shape),
+        uncounted(wave.interval),
+        uncounted(wave.height),
+        wave.highest,
+        wave.lowest,
+        wave.lead,
+        wave.repeats,
+    )
 
 
 @kernel

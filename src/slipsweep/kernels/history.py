@@ -1,7 +1,7 @@
 """Time histories, sampled from the parts of the motion that the exact walk notes in its log.
 
-These, and with them every sample, come from the same functions that a sweep calls: a history ends at the displacement
-that the sweep gives.
+These, and with them every sample, come from the same functions that a sweep calls: a history ends
+at the displacement that the sweep gives.
 """
 
 import math
@@ -53,9 +53,12 @@ def table_cycle(wave: Wave, n: int) -> int:
 
 
 @scalar
-def fill_base(amplitude: float, cycles: int, wave: Wave, phases: np.ndarray, found: History) -> None:
+def fill_base(
+    amplitude: float, cycles: int, wave: Wave, phases: np.ndarray, found: History
+) -> None:
     """Fill the base's acceleration at increasing phases; at a jump, the value after it."""
-    pieces, p = wave.pieces, 0
+    pieces = wave.pieces
+    p = 0
     end = pieces[pieces.shape[0] - 1].end + 2.0 * math.pi * max(wave.repeats - 1, 0)
     for at in range(phases.size):
         found.ground_acceleration[at] = 0.0
@@ -67,32 +70,49 @@ def fill_base(amplitude: float, cycles: int, wave: Wave, phases: np.ndarray, fou
                 p = wave.cycle[c]
             while p + 1 < wave.cycle[c + 1] and pieces[p].end <= phi:
                 p += 1
-            tau = min(max(pieces[p].begin + (phi - pieces[p].start), pieces[p].begin), pieces[p].finish)
+            tau = min(
+                max(pieces[p].begin + (phi - pieces[p].start), pieces[p].begin), pieces[p].finish
+            )
             found.ground_acceleration[at] = base_acceleration(pieces[p], amplitude, tau)
 
 
 @scalar
 def sample_part(
-    block: Block, wave: Wave, log: np.ndarray, row: int, phi: float, now: Moving, at: int, found: History
+    block: Block,
+    wave: Wave,
+    log: np.ndarray,
+    row: int,
+    phi: float,
+    now: Moving,
+    at: int,
+    found: History,
 ) -> None:
     """Fill Ü, V and W of a sample at phase φ of the table in a part of the motion."""
     part = log[row]
-    since, b, tau = max(phi - part["start"], 0.0), part["held"], part["tau"]
+    since = max(phi - part["start"], 0.0)
+    b = part["held"]
+    tau = part["tau"]
     velocity = now.velocity + part["velocity"]
-    displacement = now.displacement + now.velocity * (part["start"] - now.start) + part["displacement"]
+    displacement = (
+        now.displacement + now.velocity * (part["start"] - now.start) + part["displacement"]
+    )
     if part["kind"] == exact.ATTENUATE:
         found.block_acceleration[at] += b
-        gained, moved = -b * since, -0.5 * b * since * since
+        gained = -b * since
+        moved = -0.5 * b * since * since
     elif part["kind"] == exact.HOLD:
         found.block_acceleration[at] = b
-        gained, moved = held_integrals(wave.pieces[part["piece"]], block.amplitude, b, tau, tau + since)
+        gained, moved = held_integrals(
+            wave.pieces[part["piece"]], block.amplitude, b, tau, tau + since
+        )
     else:
         found.block_acceleration[at] = physics.response(block, found.ground_acceleration[at])
         gained, moved = eq4_integrals(block, wave.pieces[part["piece"]], tau, tau + since)
     left = velocity + gained
     if part["kind"] != exact.SLIDE_ON:  # beyond a stop, by rounding
         left = max(left, 0.0) if velocity >= 0.0 else min(left, 0.0)
-    found.velocity[at], found.displacement[at] = left, displacement + velocity * since + moved
+    found.velocity[at] = left
+    found.displacement[at] = displacement + velocity * since + moved
 
 
 @scalar
@@ -106,9 +126,16 @@ def begins_at(block: Block, wave: Wave, k: int) -> float:
 
 @scalar
 def sample_log(
-    block: Block, wave: Wave, log: np.ndarray, until: float, offset: float, now: Moving, phases: np.ndarray, at: int,
+    block: Block,
+    wave: Wave,
+    log: np.ndarray,
+    until: float,
+    offset: float,
+    now: Moving,
+    phases: np.ndarray,
+    at: int,
     found: History,
-) -> int:  # fmt: skip
+) -> int:
     """Fill Ü, V and W up to phase `until` of the table from a log; the first sample beyond.
 
     Phases of the table are those of the samples less `offset`.
@@ -131,25 +158,48 @@ def sample_log(
 
 @scalar
 def fill_pulses(
-    cell: physics.Cell, block: Block, options: Options, wave: Wave, workspace: Workspace, is_record: bool,
-    phases: np.ndarray, found: History,
-) -> None:  # fmt: skip
+    cell: physics.Cell,
+    block: Block,
+    options: Options,
+    wave: Wave,
+    workspace: Workspace,
+    is_record: bool,
+    phases: np.ndarray,
+    found: History,
+) -> None:
     """Fill Ü, V and W pulse by pulse; of a record each has the friction of its own peak."""
-    at, velocity, displacement = 0, 0.0, 0.0
-    k, repeat = first_pulse(block, wave, 0), 0
+    at = 0
+    velocity = 0.0
+    displacement = 0.0
+    k = first_pulse(block, wave, 0)
+    repeat = 0
     while at < phases.size and k < wave.height.size:
-        following, peak, continuous = first_pulse(block, wave, k + 1), block.amplitude * wave.height[k], False
+        following = first_pulse(block, wave, k + 1)
+        peak = block.amplitude * wave.height[k]
+        continuous = False
         if is_record:
             block, interface = recorded.block_in_pulse(exponential(), cell, options, peak)
             continuous = recorded.slides_continuously(interface, options, peak)
-        now = recorded.recorded_pulse(block, continuous, options, wave, k, following, peak, velocity, workspace)
+        now = recorded.recorded_pulse(
+            block, continuous, options, wave, k, following, peak, velocity, workspace
+        )
         # the log of continuous sliding begins at rest
-        before = Moving(begins_at(block, wave, k), velocity if continuous else 0.0, displacement, now.displacement)
-        log, until = workspace.log[: workspace.logged[0]], begins_at(block, wave, following)
+        before = Moving(
+            begins_at(block, wave, k),
+            velocity if continuous else 0.0,
+            displacement,
+            now.displacement,
+        )
+        log = workspace.log[: workspace.logged[0]]
+        until = begins_at(block, wave, following)
         at = sample_log(block, wave, log, until, 2.0 * math.pi * repeat, before, phases, at, found)
-        velocity, displacement = now.velocity, displacement + now.displacement
+        velocity = now.velocity
+        displacement = displacement + now.displacement
         # the plain cycle of the table comes again and again
-        again = following < wave.height.size and wave.interval[following, 0] >= wave.cycle[wave.lead + 1]
+        again = (
+            following < wave.height.size
+            and wave.interval[following, 0] >= wave.cycle[wave.lead + 1]
+        )
         if again and repeat < wave.repeats - 1:
             repeat += 1
             following = first_pulse(block, wave, 0)
@@ -167,31 +217,44 @@ def fill_cycles(
     if k == wave.height.size:
         return
     first, began = beginning(block, wave, k)
-    at, slides, velocity, displacement = 0, False, 0.0, 0.0
+    at = 0
+    slides = False
+    velocity = 0.0
+    displacement = 0.0
     for n in range(cycles):
         c = table_cycle(wave, n)
-        p, until = wave.cycle[c], wave.cycle[c + 1]
+        p = wave.cycle[c]
+        until = wave.cycle[c + 1]
         if p == until or (not slides and until <= first):
             continue
         tau = wave.pieces[p].begin
         if not slides:
-            p, tau, slides = first, began, True
+            p = first
+            tau = began
+            slides = True
         gain = follow_eq4(block, wave, workspace, p, tau, until, -math.inf)
         log = workspace.log[: workspace.logged[0]]
-        start, end = phase_at(wave.pieces[p], tau), wave.pieces[until - 1].end
+        start = phase_at(wave.pieces[p], tau)
+        end = wave.pieces[until - 1].end
         before = Moving(start, velocity, displacement, 0.0)
         at = sample_log(block, wave, log, end, 2.0 * math.pi * (n - c), before, phases, at, found)
         displacement += velocity * (end - start) + gain.displacement
         velocity += gain.velocity
     for after in range(at, phases.size):
-        found.velocity[after], found.displacement[after] = velocity, displacement
+        found.velocity[after] = velocity
+        found.displacement[after] = displacement
 
 
 @single
 def fill(
-    cell: physics.Cell, options: Options, wave: Wave, workspace: Workspace, is_record: bool, phases: np.ndarray,
+    cell: physics.Cell,
+    options: Options,
+    wave: Wave,
+    workspace: Workspace,
+    is_record: bool,
+    phases: np.ndarray,
     found: History,
-) -> None:  # fmt: skip
+) -> None:
     """Fill a history; where the block does not slide it moves with the base."""
     peak = cell.amplitude * wave.highest if is_record else cell.amplitude
     block, interface = recorded.block_in_pulse(exponential(), cell, options, peak)
@@ -205,13 +268,22 @@ def fill(
         fill_cycles(block, options.cycles, wave, workspace, phases, found)
     for at in range(phases.size):
         found.friction_coefficient[at] = eq.mobilised_friction(  # Eq. 1
-            found.ground_acceleration[at], found.block_acceleration[at], block.mu_s, block.tan_theta, block.g
+            found.ground_acceleration[at],
+            found.block_acceleration[at],
+            block.mu_s,
+            block.tan_theta,
+            block.g,
         )
 
 
 @kernel
 def fill_history(
-    cell: physics.Cell, options: Options, wave: Wave, workspace: Workspace, phases: np.ndarray, found: History
+    cell: physics.Cell,
+    options: Options,
+    wave: Wave,
+    workspace: Workspace,
+    phases: np.ndarray,
+    found: History,
 ) -> None:
     """Fill a history under a waveform at increasing phases."""
     fill(cell, options, wave, workspace, False, phases, found)
@@ -219,7 +291,12 @@ def fill_history(
 
 @kernel
 def fill_recorded_history(
-    cell: physics.Cell, options: Options, wave: Wave, workspace: Workspace, times: np.ndarray, found: History
+    cell: physics.Cell,
+    options: Options,
+    wave: Wave,
+    workspace: Workspace,
+    times: np.ndarray,
+    found: History,
 ) -> None:
     """Fill a history under a record at increasing times, at time scale 1; `cell.amplitude` is the factor on it."""
     fill(cell, options, wave, workspace, True, times, found)

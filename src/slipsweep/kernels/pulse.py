@@ -1,7 +1,8 @@
 """Pulses of a motion: where they begin, and what one leaves to the next.
 
-A pulse begins where the base's acceleration comes to Üy, or jumps past it, after it was not positive (t1 at the
-earliest), and lasts to where the next one begins.  Velocity is all that one leaves to the next.
+A pulse begins where the base's acceleration comes to Üy, or jumps past it, after it was not
+positive (t1 at the earliest), and lasts to where the next one begins.  Velocity is all that one
+leaves to the next.
 """
 
 import math
@@ -22,7 +23,8 @@ _INTERVALS = 32
 class Pulse(NamedTuple):
     """From one Üg = Üy to the next: V at its end, W gained, the largest and the least V, slides begun from rest.
 
-    `validity` says if there is no value: b ≤ 0 at the end of any of its rises (NaN, if at the end of the last).
+    `validity` says if there is no value: b ≤ 0 at the end of any of its rises (NaN, if at the end
+    of the last).
     """
 
     velocity: float
@@ -45,7 +47,9 @@ def first_pulse(block: Block, wave: Wave, k: int) -> int:
 def beginning(block: Block, wave: Wave, k: int) -> tuple[int, float]:
     """Where in interval k the base's acceleration comes to Üy or jumps past it: a piece, and τ on it."""
     p = wave.interval[k, 0]
-    while block.amplitude * max(wave.pieces[p].first, wave.pieces[p].last) <= block.yield_acceleration:
+    while (
+        block.amplitude * max(wave.pieces[p].first, wave.pieces[p].last) <= block.yield_acceleration
+    ):
         p += 1
     if block.amplitude * wave.pieces[p].first >= block.yield_acceleration:
         return p, wave.pieces[p].begin
@@ -55,7 +59,8 @@ def beginning(block: Block, wave: Wave, k: int) -> tuple[int, float]:
 @inlined
 def rises_anew(pieces: np.ndarray, p: int) -> bool:
     """Whether piece p, of Üg > 0, begins by a jump upwards, is a plateau, or rises after a fall."""
-    first, last = pieces[p].first, pieces[p].last
+    first = pieces[p].first
+    last = pieces[p].last
     fell = p > 0 and pieces[p - 1].first > pieces[p - 1].last
     return pieces[p].jumps or (first > 0.0 and (first == last or (first < last and fell)))
 
@@ -88,12 +93,18 @@ def yield_seems_to_govern(block: Block, wave: Wave) -> bool:
     largest = -math.inf if block.rise != physics.NEWMARK else math.inf
     for p in range(wave.pieces.shape[0]):
         low, high = _rise_above_yield(block, wave.pieces[p])
-        before, now = math.inf, -math.inf
+        before = math.inf
+        now = -math.inf
         for j in range(_INTERVALS + 1 if low <= high else 0):
             eq4 = physics.response(block, low + (high - low) * (j / _INTERVALS))
             if before < now > eq4:  # the vertex of the parabola through three
-                largest = max(largest, now + (eq4 - before) * (eq4 - before) / (8.0 * (2.0 * now - before - eq4)))
-            largest, before, now = max(largest, eq4), now, eq4
+                largest = max(
+                    largest,
+                    now + (eq4 - before) * (eq4 - before) / (8.0 * (2.0 * now - before - eq4)),
+                )
+            largest = max(largest, eq4)
+            before = now
+            now = eq4
     return largest <= block.yield_acceleration
 
 
@@ -103,6 +114,10 @@ def motion_of(block: Block, sliding_mode: int, validity: int, found: Pulse) -> M
     validity |= found.validity
     if math.isnan(found.displacement) and validity & physics.NO_VALUE == 0:
         validity |= physics.UNSOLVED
-    validity = physics.settled(physics.without_estimates(validity), found.displacement, block.amplitude)
+    validity = physics.settled(
+        physics.without_estimates(validity), found.displacement, block.amplitude
+    )
     mode = -1 if validity & physics.NO_VALUE else sliding_mode
-    return Motion(found.displacement, found.peak, float(mode), float(validity), math.nan, math.nan, math.nan)
+    return Motion(
+        found.displacement, found.peak, float(mode), float(validity), math.nan, math.nan, math.nan
+    )

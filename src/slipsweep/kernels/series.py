@@ -27,18 +27,23 @@ def series_of(
 ) -> Callable[[Block, Options, Wave, Any], Pulse]:
     """The jitted series of the cycles of continuous sliding.
 
-    ``follow(block, wave, workspace, c, p, tau)`` is Eq. 4 from rest at τ on piece p to the end of cycle c of the table.
+    ``follow(block, wave, workspace, c, p, tau)`` is Eq. 4 from rest at τ on piece p to the end of
+    cycle c of the table.
     """
 
     @scalar
     def slide_continuously(block: Block, options: Options, wave: Wave, workspace: Any) -> Pulse:
         """Continuous sliding from the first Üg ≥ Üy on, as one pulse: Eq. 4 throughout."""
-        velocity, displacement, peak = 0.0, 0.0, 0.0
-        whole, known = Gain(0.0, 0.0, 0.0), -1
+        velocity = 0.0
+        displacement = 0.0
+        peak = 0.0
+        whole = Gain(0.0, 0.0, 0.0)
+        known = -1
         k = first_pulse(block, wave, 0)
         p, tau = beginning(block, wave, k) if k < wave.height.size else (wave.pieces.shape[0], 0.0)
         for c in range(wave.shape.size):
-            first, repeats = wave.cycle[c], wave.repeats if wave.repeats > 0 and c == wave.lead else 1
+            first = wave.cycle[c]
+            repeats = wave.repeats if wave.repeats > 0 and c == wave.lead else 1
             if wave.cycle[c + 1] <= p:
                 continue
             if first <= p:
@@ -47,10 +52,13 @@ def series_of(
             if repeats == 0:
                 continue
             if wave.shape[c] != known:
-                whole, known = follow(block, wave, workspace, c, first, wave.pieces[first].begin), wave.shape[c]
+                whole = follow(block, wave, workspace, c, first, wave.pieces[first].begin)
+                known = wave.shape[c]
             later = repeats - 1.0
             peak = max(peak, max(velocity, velocity + later * whole.velocity) + whole.peak)
-            displacement += repeats * (whole.displacement + math.pi * (2.0 * velocity + whole.velocity * later))
+            displacement += repeats * (
+                whole.displacement + math.pi * (2.0 * velocity + whole.velocity * later)
+            )
             velocity += repeats * whole.velocity
         return Pulse(velocity, displacement, peak, 0.0, 0.0, 0)
 

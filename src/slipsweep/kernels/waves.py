@@ -16,8 +16,11 @@ solve_cell = cell_solver_of(pulse, slide_continuously, yield_governs)
 
 
 @kernel
-def solve_waves(cells: np.ndarray, options: Options, wave: Wave, workspace: Workspace, results: np.ndarray) -> None:
+def solve_waves(
+    cells: np.ndarray, options: Options, wave: Wave, workspace: Workspace, results: np.ndarray
+) -> None:
     """Solve the cells of a tile under a waveform exactly; `results` is (fields of `Motion`, cells)."""
-    wave, workspace = uncounted_wave(wave), uncounted_workspace(workspace)
+    wave = uncounted_wave(wave)
+    workspace = uncounted_workspace(workspace)
     for j in range(cells.size):
         store(solve_cell(exponential(), cell_at(cells, j), options, wave, workspace), j, results)

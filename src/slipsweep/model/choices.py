@@ -1,7 +1,8 @@
 """What a user may choose, declared once: a class a choice, a field an option.
 
-From these declarations come Python's arguments (`model=Mendez(rise="literal")`), the keys of a sweep file's table
-(`rise = "literal"`), the options of the command line (`--rise literal`), and the attributes of a result's file.
+From these declarations come Python's arguments (`model=Mendez(rise="literal")`), the keys of a
+sweep file's table (`rise = "literal"`), the options of the command line (`--rise literal`), and the
+attributes of a result's file.
 """
 
 import dataclasses
@@ -9,19 +10,33 @@ import functools
 import types
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Generic, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import (
+    Any,
+    ClassVar,
+    Generic,
+    Literal,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.model import parameters
 from slipsweep.model.parameters import check_choice, shown
 
 
-def option(about: str, default: Any = dataclasses.MISSING, *, least: int = 0, most: int | None = None) -> Any:
+def option(
+    about: str, default: Any = dataclasses.MISSING, *, least: int = 0, most: int | None = None
+) -> Any:
     """A field of a `Choice`, with one line on what it is about.
 
     A whole number is `least` to `most`; another is within the bounds of the parameter of its name.
     """
-    return dataclasses.field(default=default, metadata={"about": about, "least": least, "most": most})
+    return dataclasses.field(
+        default=default, metadata={"about": about, "least": least, "most": most}
+    )
 
 
 @dataclass(frozen=True)
@@ -79,7 +94,8 @@ class Choice:
 
 
 def _declared(choice: Any) -> tuple[Option, ...]:
-    found, hints = [], get_type_hints(choice)
+    found = []
+    hints = get_type_hints(choice)
     for field in dataclasses.fields(choice):
         hint = hints[field.name]
         if get_origin(hint) in (Union, types.UnionType):
@@ -87,11 +103,16 @@ def _declared(choice: Any) -> tuple[Option, ...]:
         is_list = get_origin(hint) is Sequence
         kind = get_args(hint)[0] if is_list else hint
         words = get_args(kind) if get_origin(kind) is Literal else ()
-        found.append(Option(field.name, field.default, str if words else kind, words, is_list, **field.metadata))
+        found.append(
+            Option(
+                field.name, field.default, str if words else kind, words, is_list, **field.metadata
+            )
+        )
     return tuple(found)
 
 
-#: The options of a class of choices, in the order of its fields; every object made asks for them, and hints take long.
+#: The options of a class of choices, in the order of its fields; every object made asks for them,
+#: and hints take long.
 declared: Callable[[Any], tuple[Option, ...]] = functools.cache(_declared)
 
 Some = TypeVar("Some", bound=Choice)
@@ -124,7 +145,9 @@ class Family(Generic[Some]):
 
     def having(self, name: str) -> list[str]:
         """Names of the choices that have an option."""
-        return [choice.name for choice in self.choices if name in {one.name for one in declared(choice)}]
+        return [
+            choice.name for choice in self.choices if name in {one.name for one in declared(choice)}
+        ]
 
     def of(self, given: Any) -> Some:
         """The choice that a caller gives: an object, or the name of one with its defaults."""
@@ -132,7 +155,8 @@ class Family(Generic[Some]):
             return given
         if isinstance(given, str) and given in self.names:
             return self.made(given, {})
-        names, objects = map(repr, self.names), (f"{choice.__name__}(...)" for choice in self.choices)
+        names = map(repr, self.names)
+        objects = (f"{choice.__name__}(...)" for choice in self.choices)
         allowed = f"{', '.join(names)}, or {', '.join(objects)}"
         raise InputError(f"{self.keyword} = {shown(given)}: must be one of {allowed}")
 
@@ -147,7 +171,9 @@ class Family(Generic[Some]):
             if unknown not in self.options:
                 raise InputError(f"{key(unknown)}: unknown; {did_you_mean(unknown, tuple(known))}")
             allowed = ", ".join(map(repr, self.having(unknown)))
-            raise InputError(f"{key(unknown)}: not allowed with {key(self.key)} = {name!r}, only with {allowed}")
+            raise InputError(
+                f"{key(unknown)}: not allowed with {key(self.key)} = {name!r}, only with {allowed}"
+            )
         for one in known.values():
             if one.default is dataclasses.MISSING and one.name not in options:
                 raise InputError(f"{key(one.name)}: must be given with {key(self.key)} = {name!r}")
@@ -165,8 +191,12 @@ class Family(Generic[Some]):
         """The choice that the attributes of a result tell of (InputError: they tell of none)."""
         if self.attribute not in attributes:
             raise InputError(f"attribute {self.attribute!r}: missing")
-        choice = self.called(check_choice(f"attribute {self.attribute}", attributes[self.attribute], self.names))
-        options = {one.name: attributes[one.name] for one in declared(choice) if one.name in attributes}
+        choice = self.called(
+            check_choice(f"attribute {self.attribute}", attributes[self.attribute], self.names)
+        )
+        options = {
+            one.name: attributes[one.name] for one in declared(choice) if one.name in attributes
+        }
         for name in options:  # files give a list of one number as a number
             if self.options[name].is_list and not isinstance(options[name], Sequence):
                 options[name] = getattr(options[name], "flat", [options[name]])

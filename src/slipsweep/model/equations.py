@@ -1,8 +1,9 @@
 """The equations of Mendez, Romo and Botero (2012), one small function each.
 
-Scalars in, a scalar out, SI units, angles already as tangents; the equation number of the paper stands in each
-docstring.  The kernels call these functions as they are, so that what is written here is what is computed.  The
-operators of the printed equations were recovered from the paper's Table 1 (docs/tutorial.md, "Against the paper").
+Scalars in, a scalar out, SI units, angles already as tangents; the equation number of the paper
+stands in each docstring.  The kernels call these functions as they are, so that what is written
+here is what is computed.  The operators of the printed equations were recovered from the paper's
+Table 1 (docs/tutorial.md, "Against the paper").
 """
 
 import math
@@ -37,15 +38,20 @@ def mobilised_friction(
 ) -> float:
     """Eq. 1: the friction coefficient that goes with a block acceleration."""
     n = normal_acceleration(ground_acceleration, tan_theta, g)
-    return mu_s - tan_theta - (abs(ground_acceleration) - abs(block_acceleration) - g * tan_theta) / n
+    return (
+        mu_s - tan_theta - (abs(ground_acceleration) - abs(block_acceleration) - g * tan_theta) / n
+    )
 
 
 @inlined
-def lag(ground_acceleration: float, friction: float, mu_s: float, tan_theta: float, g: float) -> float:
+def lag(
+    ground_acceleration: float, friction: float, mu_s: float, tan_theta: float, g: float
+) -> float:
     """Eq. 4 as what the block falls short of the base's acceleration, |Üg| − |Ü|, m/s².
 
     n (μs − tan θ − μ) + g tan θ is written g (μs − μ) + Üg tan θ (μs − tan θ − μ): near static
-    failure Üg is small against g tan θ, which would take its digits (docs/numerics.md#eq-4-as-a-lag).
+    failure Üg is small against g tan θ, which would take its digits
+    (docs/numerics.md#eq-4-as-a-lag).
     """
     return g * (mu_s - friction) + drift(ground_acceleration, friction, mu_s, tan_theta)
 
@@ -54,8 +60,8 @@ def lag(ground_acceleration: float, friction: float, mu_s: float, tan_theta: flo
 def drift(ground_acceleration: float, friction: float, mu_s: float, tan_theta: float) -> float:
     """The part of `lag` that turns its sign with Üg, Üg tan θ (μs − tan θ − μ), m/s².
 
-    It is the mean of the relative accelerations at Üg and at −Üg: all that drives a block in continuous
-    sliding down the plane, as the other part cancels over a cycle.
+    It is the mean of the relative accelerations at Üg and at −Üg: all that drives a block in
+    continuous sliding down the plane, as the other part cancels over a cycle.
     """
     return ground_acceleration * tan_theta * (mu_s - tan_theta - friction)
 
@@ -65,31 +71,51 @@ def relative_acceleration(
     ground_acceleration: float, friction: float, mu_s: float, tan_theta: float, g: float
 ) -> float:
     """Eq. 4 as the rate of the relative velocity while the block slides, D = Üg − Ü, m/s²."""
-    return math.copysign(1.0, ground_acceleration) * lag(ground_acceleration, friction, mu_s, tan_theta, g)
+    return math.copysign(1.0, ground_acceleration) * lag(
+        ground_acceleration, friction, mu_s, tan_theta, g
+    )
 
 
 @inlined
 def relative_acceleration_slope(
-    ground_acceleration: float, friction: float, friction_slope: float, mu_s: float, tan_theta: float, g: float
+    ground_acceleration: float,
+    friction: float,
+    friction_slope: float,
+    mu_s: float,
+    tan_theta: float,
+    g: float,
 ) -> float:
     """dD/dÜg of Eq. 4, `friction_slope` = dμ/d|Üg|; the slope of Ü is 1 − dD/dÜg."""
     n = normal_acceleration(ground_acceleration, tan_theta, g)
-    return math.copysign(tan_theta, ground_acceleration) * (mu_s - tan_theta - friction) - n * friction_slope
+    return (
+        math.copysign(tan_theta, ground_acceleration) * (mu_s - tan_theta - friction)
+        - n * friction_slope
+    )
 
 
 @inlined
 def relative_acceleration_curvature(
-    ground_acceleration: float, friction_slope: float, friction_curvature: float, tan_theta: float, g: float
+    ground_acceleration: float,
+    friction_slope: float,
+    friction_curvature: float,
+    tan_theta: float,
+    g: float,
 ) -> float:
     """d²D/dÜg² of Eq. 4, from dμ/d|Üg| and d²μ/d|Üg|²."""
     n = normal_acceleration(ground_acceleration, tan_theta, g)
-    return -2.0 * tan_theta * friction_slope - math.copysign(n * friction_curvature, ground_acceleration)
+    return -2.0 * tan_theta * friction_slope - math.copysign(
+        n * friction_curvature, ground_acceleration
+    )
 
 
 @inlined
-def block_acceleration(ground_acceleration: float, friction: float, mu_s: float, tan_theta: float, g: float) -> float:
+def block_acceleration(
+    ground_acceleration: float, friction: float, mu_s: float, tan_theta: float, g: float
+) -> float:
     """Eq. 4: response of the sliding block to the base's acceleration, m/s²."""
-    return ground_acceleration - relative_acceleration(ground_acceleration, friction, mu_s, tan_theta, g)
+    return ground_acceleration - relative_acceleration(
+        ground_acceleration, friction, mu_s, tan_theta, g
+    )
 
 
 @registered
@@ -107,7 +133,9 @@ def limit_denominator(mu_s: float, tan_theta: float) -> float:
 
 
 @inlined
-def limiting_acceleration(yield_acceleration: float, mu_s: float, tan_theta: float, g: float) -> float:
+def limiting_acceleration(
+    yield_acceleration: float, mu_s: float, tan_theta: float, g: float
+) -> float:
     """Eq. 7: the largest acceleration the interface transmits (Eq. 4 with μ = 0, Ü = Üy), m/s²."""
     return (yield_acceleration + g * mu_s) / limit_denominator(mu_s, tan_theta)
 
@@ -132,7 +160,9 @@ def delta_mu(mu_s: float, ratio: float) -> float:
 
 
 @inlined
-def decay_rate(amplitude: float, mu_s: float, delta_mu: float, minimum_friction: float, g: float) -> float:
+def decay_rate(
+    amplitude: float, mu_s: float, delta_mu: float, minimum_friction: float, g: float
+) -> float:
     """Eq. 6 solved for λ with μ = μmin at the peak of the motion."""
     return g / amplitude * log((mu_s + delta_mu) / minimum_friction)
 
@@ -144,11 +174,15 @@ def attenuated_velocity(velocity: float, peak_block_acceleration: float, duratio
 
 
 @inlined
-def attenuated_displacement(velocity: float, peak_block_acceleration: float, duration: float) -> float:
+def attenuated_displacement(
+    velocity: float, peak_block_acceleration: float, duration: float
+) -> float:
     """Eq. 12: relative displacement in `duration`, which may be infinite, or up to the stop."""
     stops = velocity <= peak_block_acceleration * duration
     to_the_stop = 0.5 * velocity * (velocity / peak_block_acceleration)  # the square might overflow
-    return to_the_stop if stops else (velocity - 0.5 * peak_block_acceleration * duration) * duration
+    return (
+        to_the_stop if stops else (velocity - 0.5 * peak_block_acceleration * duration) * duration
+    )
 
 
 @inlined

@@ -1,8 +1,9 @@
 """Friction laws: the friction coefficient as a function of the base's acceleration.
 
-A law is a few small functions.  The stepping kernel (`kernels.step`) needs μ(|Üg|) alone, of any law that falls; the
-exact kernel (`kernels.exact`) needs the others, too (`FrictionLaw.missing` names those that a law lacks).  The law of
-the paper is `exponential`, Eq. 6; its original law, Eq. 5, is Eq. 6 with Δμ = 0.  To add a law: CONTRIBUTING.md.
+A law is a few small functions.  The stepping kernel (`kernels.step`) needs μ(|Üg|) alone, of any
+law that falls; the exact kernel (`kernels.exact`) needs the others, too (`FrictionLaw.missing`
+names those that a law lacks).  The law of the paper is `exponential`, Eq. 6; its original law, Eq.
+5, is Eq. 6 with Δμ = 0.  To add a law: CONTRIBUTING.md.
 """
 
 import math
@@ -19,17 +20,24 @@ from slipsweep.model import equations as eq
 class FrictionLaw(NamedTuple):
     """What the kernels need of a friction law: jitted functions of the numbers behind them.
 
-    μs, Δμ and λ are the parameters of every law (`mu_s`, `delta_mu`, `decay_rate`); what λ means is the law's own.
+    μs, Δμ and λ are the parameters of every law (`mu_s`, `delta_mu`, `decay_rate`); what λ means is
+    the law's own.
     """
 
-    friction: Callable[..., float]  # (ground_acceleration, mu_s, delta_mu, decay_rate, g): μ at Üg of either sign
-    derivatives: Any = None  # (friction, decay_rate, g): dμ/d|Üg| and d²μ/d|Üg|², where the law gives `friction`
+    friction: Callable[
+        ..., float
+    ]  # (ground_acceleration, mu_s, delta_mu, decay_rate, g): μ at Üg of either sign
+    derivatives: Any = (
+        None  # (friction, decay_rate, g): dμ/d|Üg| and d²μ/d|Üg|², where the law gives `friction`
+    )
     inflection: Any = None  # (tan_theta, decay_rate, g): Üg up to which Ü of Eq. 4 is concave; it is convex beyond
     static_acceleration: Any = None  # (mu_s, delta_mu, decay_rate, g): |Üg| at which μ is μs
-    #: (start, change, mu_s, delta_mu, decay_rate, g): ∫ μ times 1, 1 − w, w and w (1 − w) over w from 0 to 1, where
-    #: |Üg| = start + w change
+    #: (start, change, mu_s, delta_mu, decay_rate, g): ∫ μ times 1, 1 − w, w and w (1 − w) over w
+    #: from 0 to 1, where |Üg| = start + w change
     moments: Any = None
-    decay_length: Any = None  # (decay_rate, g): the change of |Üg| over which μ falls to a part 1/e, or less
+    decay_length: Any = (
+        None  # (decay_rate, g): the change of |Üg| over which μ falls to a part 1/e, or less
+    )
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -54,7 +62,9 @@ def exponential_inflection(tan_theta: float, decay_rate: float, g: float) -> flo
 
 
 @registered
-def exponential_static_acceleration(mu_s: float, delta_mu: float, decay_rate: float, g: float) -> float:
+def exponential_static_acceleration(
+    mu_s: float, delta_mu: float, decay_rate: float, g: float
+) -> float:
     """|Üg| at which Eq. 6 gives μs: (g/λ) ln((μs + Δμ)/μs)."""
     return g / decay_rate * log((mu_s + delta_mu) / mu_s)
 
@@ -65,9 +75,10 @@ def exponential_decay_length(decay_rate: float, g: float) -> float:
     return g / decay_rate
 
 
-#: From here on the moments' closed forms lose less than a digit; below, φ₃'s power series Σ (−z)^k / (k + 3)! is
-#: summed.  From `_DECAYED` on e^(−z) is 0.
-_SERIES_END, _DECAYED = 2.0, 708.0
+#: From here on the moments' closed forms lose less than a digit; below, φ₃'s power series Σ (−z)^k
+#: / (k + 3)! is summed.  From `_DECAYED` on e^(−z) is 0.
+_SERIES_END = 2.0
+_DECAYED = 708.0
 _SERIES = np.array([1.0 / math.factorial(k + 3) for k in range(21)])
 
 
@@ -75,8 +86,8 @@ _SERIES = np.array([1.0 / math.factorial(k + 3) for k in range(21)])
 def moments_of_decay(z: float) -> tuple[float, float, float, float]:
     """∫ e^(−zw) times 1, 1 − w, w and w (1 − w) over w from 0 to 1, for z ≥ 0.
 
-    The first two are φ₁ and φ₂ of exponential integrators at −z, and all follow from φ₃.  Below z = 2 that is
-    summed, and φₙ = 1/n! − z φₙ₊₁; beyond by the closed forms, which cancel at small z.
+    The first two are φ₁ and φ₂ of exponential integrators at −z, and all follow from φ₃.  Below z =
+    2 that is summed, and φₙ = 1/n! − z φₙ₊₁; beyond by the closed forms, which cancel at small z.
     """
     if z < _SERIES_END:
         third = 0.0
@@ -87,7 +98,8 @@ def moments_of_decay(z: float) -> tuple[float, float, float, float]:
         return whole, early, whole - early, early - 2.0 * third
     decayed = exp(-z) if z < _DECAYED else 0.0
     whole = (1.0 - decayed) / z
-    early, late = (1.0 - whole) / z, (whole - decayed) / z
+    early = (1.0 - whole) / z
+    late = (whole - decayed) / z
     return whole, early, late, (early - late) / z
 
 
@@ -97,8 +109,8 @@ def exponential_moments(
 ) -> tuple[float, float, float, float]:
     """Moments of Eq. 6 along a straight line of |Üg| from `start` by `change` (docs/numerics.md#straight-pieces).
 
-    The exponential is taken from the end where the friction is larger, so that its argument is never positive:
-    nothing overflows, however large λ is.
+    The exponential is taken from the end where the friction is larger, so that its argument is
+    never positive: nothing overflows, however large λ is.
     """
     largest = eq.friction_coefficient(min(start, start + change), mu_s, delta_mu, decay_rate, g)
     whole, larger, smaller, both = moments_of_decay(decay_rate / g * abs(change))

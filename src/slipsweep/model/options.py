@@ -136,7 +136,8 @@ class Step(Choice):
 
     name: ClassVar[str] = "step"
     rule: Rule = option("rule of the steps; orders 1, 2 and 4", "trapezoid")
-    # by default the trapezoid's median error is 1e-5 (docs/speed.md); the most is what any accuracy needs, and more
+    # by default the trapezoid's median error is 1e-5 (docs/speed.md); the most is what any accuracy
+    # needs, and more
     steps_per_cycle: int = option("steps in a cycle", 1024, least=8, most=16_777_216)
 
     def check(self) -> None:
@@ -149,9 +150,12 @@ Model = Mendez | Newmark
 Solver = Cycle | Step
 
 MODELS: Family[Model] = Family("model", "friction", (Mendez, Newmark), "mendez", "model")
-SOLVERS: Family[Solver] = Family("solver", "method", (Cycle, Step), "auto", "solver", {"auto": "cycle"})
+SOLVERS: Family[Solver] = Family(
+    "solver", "method", (Cycle, Step), "auto", "solver", {"auto": "cycle"}
+)
 
-#: Inputs that the displacement depends on: symbol, and the estimate in place of one that is not given.
+#: Inputs that the displacement depends on: symbol, and the estimate in place of one that is not
+#: given.
 _INPUTS = {
     "yield_acceleration": ("Üy", "by Coulomb"),
     "decay_rate": ("λ", "by Eq. 6"),
@@ -162,8 +166,8 @@ _INPUTS = {
 def friction_inputs(model: str, given: Collection[str], drawn: Mapping[str, str]) -> str:
     """Where Üy, λ and Δμ of a result come from, such as 'Üy, λ given; Δμ by Eqs. 10–11: estimated'.
 
-    `drawn` has uncertain parameters, and whether a draw is the value ("absolute") or one about it ("factor", "offset").
-    Newmark's block has only Üy.
+    `drawn` has uncertain parameters, and whether a draw is the value ("absolute") or one about it
+    ("factor", "offset"). Newmark's block has only Üy.
     """
     if "yield_coefficient" in drawn or "yield_coefficient" in given:
         return "Üy drawn" if "yield_coefficient" in drawn else "Üy given"
@@ -178,5 +182,7 @@ def friction_inputs(model: str, given: Collection[str], drawn: Mapping[str, str]
         else:
             notes = ["μmin given"] if name == "decay_rate" and "minimum_friction" in given else []
             notes += ["drawn about it"] if name in drawn else []
-            parts[": estimated"].append(f"{symbol} {rule}" + (f" ({', '.join(notes)})" if notes else ""))
+            parts[": estimated"].append(
+                f"{symbol} {rule}" + (f" ({', '.join(notes)})" if notes else "")
+            )
     return "; ".join(", ".join(names) + what for what, names in parts.items() if names)

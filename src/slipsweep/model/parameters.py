@@ -1,6 +1,7 @@
 """What a caller gives, checked: one clear message for the first thing that cannot be.
 
-NumPy is imported where it is needed: the command line's options, hence `slipsweep --help`, come from here.
+NumPy is imported where it is needed: the command line's options, hence `slipsweep --help`, come
+from here.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-#: The largest number, whose inverse is the least of those that are above zero: more than physics ever needs, and so
-#: much less than the largest double that no result of several of them overflows.
+#: The largest number, whose inverse is the least of those that are above zero: more than physics
+#: ever needs, and so much less than the largest double that no result of several of them overflows.
 LARGEST = 1e30
 
 #: Gravity of the models by default, m/s²: the value that reproduces the paper's tables.
@@ -52,7 +53,9 @@ def _from(low: float, high: float) -> Bound:
     return Bound(low, high, f"a finite number {'> 0, ' if low > 0.0 else ''}{least}")
 
 
-_ABOVE_0, _BELOW_1, _BELOW_90 = math.ulp(0.0), math.nextafter(1.0, 0.0), math.nextafter(90.0, 0.0)
+_ABOVE_0 = math.ulp(0.0)
+_BELOW_1 = math.nextafter(1.0, 0.0)
+_BELOW_90 = math.nextafter(90.0, 0.0)
 _FINITE, _NOT_NEGATIVE, _POSITIVE = (_from(low, LARGEST) for low in (-LARGEST, 0.0, 1.0 / LARGEST))
 
 #: What each parameter may be (MODEL: what no physics allows is an error, not a NaN).
@@ -63,16 +66,24 @@ BOUNDS: dict[str, Bound] = {
     "quantile": Bound(_ABOVE_0, _BELOW_1, "a number between 0 and 1"),
     **dict.fromkeys(("ramp_in", "ramp_out"), Bound(0.0, MOST_RAMP, f"0 to {MOST_RAMP}")),
     **dict.fromkeys(("yield_acceleration", "yield_coefficient"), _FINITE),
-    **dict.fromkeys(("decay_rate", "delta_mu", "pgv", "arias_intensity", "threshold"), _NOT_NEGATIVE),
+    **dict.fromkeys(
+        ("decay_rate", "delta_mu", "pgv", "arias_intensity", "threshold"), _NOT_NEGATIVE
+    ),
     **dict.fromkeys(("amplitude", "displacement_amplitude"), _NOT_NEGATIVE),
     **dict.fromkeys(("mu_s", "minimum_friction", "scale", "time_scale", "displacement"), _POSITIVE),
-    **dict.fromkeys(("frequency", "structure_frequency", "maximum_amplitude", "g", "interval"), _POSITIVE),
+    **dict.fromkeys(
+        ("frequency", "structure_frequency", "maximum_amplitude", "g", "interval"), _POSITIVE
+    ),
 }
 
 #: Own units of all that may bring one.
-_UNITS = {"displacement": "m", "threshold": "m", "maximum_amplitude": "m s-2", "g": "m s-2", "interval": "s"} | {
-    name: about["units"] for name, about in PARAMETERS.items()
-}
+_UNITS = {
+    "displacement": "m",
+    "threshold": "m",
+    "maximum_amplitude": "m s-2",
+    "g": "m s-2",
+    "interval": "s",
+} | {name: about["units"] for name, about in PARAMETERS.items()}
 
 
 def number_text(value: float) -> str:
@@ -92,22 +103,31 @@ def shown(value: Any) -> str:
 def check_numbers(key: str, values: Any) -> NDArray[np.float64]:
     """Return `values` as float64; every number that a caller gives comes through here.
 
-    InputError: they are no real numbers, or entries of them are masked: a masked entry has a number, but means none.
+    InputError: they are no real numbers, or entries of them are masked: a masked entry has a
+    number, but means none.
     """
     import numpy as np
 
     array: Any = computed(values)
     if isinstance(array, np.ma.MaskedArray) and (masked := int(np.ma.count_masked(array))):
-        raise InputError(f"{key}: {masked} of {array.size} values are masked: must be numbers, every one of them")
+        raise InputError(
+            f"{key}: {masked} of {array.size} values are masked: must be numbers, every one of them"
+        )
     try:
         array = np.asarray(array)
-        exact = array.dtype == object and all(isinstance(one, (Real, Decimal)) for one in array.flat)
+        exact = array.dtype == object and all(
+            isinstance(one, (Real, Decimal)) for one in array.flat
+        )
         if array.dtype.kind not in "iuf" and not exact:
             raise TypeError
-        with np.errstate(over="ignore"):  # what is beyond double precision becomes infinite, and is refused as such
+        with np.errstate(
+            over="ignore"
+        ):  # what is beyond double precision becomes infinite, and is refused as such
             return np.asarray(array.astype(np.float64))
     except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{key} = {shown(values)}: must be a number, or an array of numbers") from None
+        raise InputError(
+            f"{key} = {shown(values)}: must be a number, or an array of numbers"
+        ) from None
 
 
 def computed(values: Any) -> Any:
@@ -117,14 +137,18 @@ def computed(values: Any) -> Any:
     return values.compute() if dask and isinstance(values, dask.Array) else values
 
 
-def check_values(name: str, values: Any, key: str | None = None, g: float = GRAVITY) -> NDArray[np.float64]:
+def check_values(
+    name: str, values: Any, key: str | None = None, g: float = GRAVITY
+) -> NDArray[np.float64]:
     """Return `values` as float64 if all are in the bounds of parameter `name`, called `key` in errors (InputError).
 
-    What brings a unit (a pint Quantity, an array of xarray with the attribute `units`) is converted to the parameter's
-    own; "g" is `g` m/s².
+    What brings a unit (a pint Quantity, an array of xarray with the attribute `units`) is converted
+    to the parameter's own; "g" is `g` m/s².
     """
     key = key or name
-    array = check_numbers(key, without_unit(key, _UNITS[name], values, g) if name in _UNITS else values)
+    array = check_numbers(
+        key, without_unit(key, _UNITS[name], values, g) if name in _UNITS else values
+    )
     bound = BOUNDS[name]
     for wrong in array[~bound.holds(array)][:1]:
         raise InputError(f"{key} = {number_text(float(wrong))}: must be {bound.text}")
@@ -181,7 +205,9 @@ def check_friction(given: Mapping[str, Any]) -> None:
 def single_friction_coefficient(mu_s: Any, phi: Any) -> float:
     """The friction coefficient of one block, given itself or as the friction angle (InputError: both, or neither)."""
     check_friction({"mu_s": mu_s, "phi": phi})
-    return check_single("mu_s", mu_s if phi is None else friction_coefficient(check_single("phi", phi)))
+    return check_single(
+        "mu_s", mu_s if phi is None else friction_coefficient(check_single("phi", phi))
+    )
 
 
 def check_given(given: Mapping[str, Any], names: Collection[str]) -> None:

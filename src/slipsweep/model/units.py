@@ -8,7 +8,9 @@ from typing import Any
 from slipsweep.errors import InputError
 
 #: Other spellings of the parameters' own units, which need no units library.
-_SPELLINGS = dict.fromkeys(("deg", "degrees"), "degree") | dict.fromkeys(("m/s2", "m/s^2", "m/s**2"), "m s-2")
+_SPELLINGS = dict.fromkeys(("deg", "degrees"), "degree") | dict.fromkeys(
+    ("m/s2", "m/s^2", "m/s**2"), "m s-2"
+)
 _SPELLINGS |= {"m/s": "m s-1", "dimensionless": "1"}
 
 #: Products and quotients of names with powers of one digit: no text can ask pint for a huge number.
@@ -19,8 +21,8 @@ _UNIT_GRAMMAR = re.compile(rf"(?:1/)?{_FACTOR}(?:[ */]{_FACTOR}){{0,8}}")
 def conversion(key: str, own: str, units: str | None, g: float) -> float:
     """What to multiply a number in `units` by, to have it in the unit `own` (InputError: they do not convert).
 
-    `key` is what the units are called in errors.  "g" as a unit of acceleration is `g`, the sweep's own gravity: an
-    amplitude "in g" is meant against the gravity that the block feels.
+    `key` is what the units are called in errors.  "g" as a unit of acceleration is `g`, the sweep's
+    own gravity: an amplitude "in g" is meant against the gravity that the block feels.
     """
     if units is None or _SPELLINGS.get(units, units) == own:
         return 1.0
@@ -58,7 +60,9 @@ def without_unit(key: str, own: str, values: Any, g: float) -> Any:
     """
     data = getattr(values, "data", values) if hasattr(values, "dims") else values
     if hasattr(data, "magnitude") and hasattr(data, "units"):
-        units: Any = re.sub(r"\s*(/|\*+)\s*", r"\1", f"{data.units:D}")  # long names: "g" would be a gram
+        units: Any = re.sub(
+            r"\s*(/|\*+)\s*", r"\1", f"{data.units:D}"
+        )  # long names: "g" would be a gram
         values = values.copy(data=data.magnitude) if hasattr(values, "dims") else data.magnitude
     else:
         units = getattr(values, "attrs", {}).get("units")
@@ -74,7 +78,9 @@ def quantity(key: str, text: str, own: str, g: float) -> float:
     `key` is what it is called in errors, `g` what "g" as a unit of acceleration stands for, m/s².
     """
     found = re.fullmatch(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*", text)
-    refusal = InputError(f"{key} = {show(text)}: must be a number, with a unit that converts to {own} if in another")
+    refusal = InputError(
+        f"{key} = {show(text)}: must be a number, with a unit that converts to {own} if in another"
+    )
     if found is None or math.isinf(float(found[1])):
         raise refusal
     try:

@@ -1,7 +1,8 @@
 """Names, units and CF attributes of everything slipsweep reads or returns, written once.
 
-`PARAMETERS` describes the inputs (they become coordinates), `RESULTS` what a sweep returns, `HISTORY` what `simulate`
-returns along time.  Datasets, netCDF files, the sweep-file schema and figures all take their words from here.
+`PARAMETERS` describes the inputs (they become coordinates), `RESULTS` what a sweep returns,
+`HISTORY` what `simulate` returns along time.  Datasets, netCDF files, the sweep-file schema and
+figures all take their words from here.
 """
 
 from enum import IntEnum, IntFlag, StrEnum
@@ -17,7 +18,8 @@ REFERENCE = (
 class SlidingMode(IntEnum):
     """Sliding mode of a cell.
 
-    It follows from the amplitude, the yield acceleration and the limiting acceleration, Eq. 7 of the paper.
+    It follows from the amplitude, the yield acceleration and the limiting acceleration, Eq. 7 of
+    the paper.
 
     See Also
     --------
@@ -78,26 +80,56 @@ class Validity(IntFlag):
     def __new__(cls, mask: int, kind: FlagKind = FlagKind.NO_VALUE, text: str = "") -> Self:
         """A flag with its kind and its text."""
         flag = int.__new__(cls, mask)
-        flag._value_, flag.kind, flag.text = mask, kind, text
+        flag._value_ = mask
+        flag.kind = kind
+        flag.text = text
         return flag
 
-    STATICALLY_UNSTABLE = 1, FlagKind.NO_VALUE, "yield acceleration <= 0: the block slides under its own weight"
+    STATICALLY_UNSTABLE = (
+        1,
+        FlagKind.NO_VALUE,
+        "yield acceleration <= 0: the block slides under its own weight",
+    )
     UPLIFT = 2, FlagKind.NO_VALUE, "A tan(theta) >= g: the block loses contact within the cycle"
-    LIMIT_UNDEFINED = 4, FlagKind.NO_VALUE, "1 - tan(theta) (mu_s - tan(theta)) <= 0: Eq. 7 has no limit"
+    LIMIT_UNDEFINED = (
+        4,
+        FlagKind.NO_VALUE,
+        "1 - tan(theta) (mu_s - tan(theta)) <= 0: Eq. 7 has no limit",
+    )
     FRICTION_NOT_DECAYING = 8, FlagKind.NO_VALUE, "calibrated decay rate <= 0 (mu_s xi^2 >= 1)"
-    YIELD_GOVERNS = 16, FlagKind.NOTE, (
-        "the yield acceleration governs: the result is that of Newmark's block and does not depend on lambda"
-    )  # fmt: skip
+    YIELD_GOVERNS = (
+        16,
+        FlagKind.NOTE,
+        (
+            "the yield acceleration governs: the result is that of Newmark's block and does not depend on lambda"
+        ),
+    )
     KD_NOT_POSITIVE = 32, FlagKind.NO_VALUE, "literal rise: Kd <= 0, Eq. 12 cannot stop the block"
-    NOT_RECOUPLED = 64, FlagKind.CAUTION, (
-        "does not come to rest within the cycle: Eq. 12 does not hold; displacement unreliable"
-    )  # fmt: skip
-    FLEXIBLE_BLOCK = 128, FlagKind.CAUTION, "0.2 <= f/fs <= 1.3: the rigid-block assumption does not hold"
-    UPSLOPE = 256, FlagKind.CAUTION, "the permanent displacement is negative: the block ends upslope"
-    NEAR_MODE_LIMIT = 512, FlagKind.CAUTION, (
-        "0.9 <= xi <= 1.1: at xi = 1 the displacement jumps to several times its value"
-    )  # fmt: skip
-    FRICTION_ESTIMATED = 1024, FlagKind.NOTE, "the displacement depends on lambda by Eq. 6 or delta_mu by Eqs. 10, 11"
+    NOT_RECOUPLED = (
+        64,
+        FlagKind.CAUTION,
+        ("does not come to rest within the cycle: Eq. 12 does not hold; displacement unreliable"),
+    )
+    FLEXIBLE_BLOCK = (
+        128,
+        FlagKind.CAUTION,
+        "0.2 <= f/fs <= 1.3: the rigid-block assumption does not hold",
+    )
+    UPSLOPE = (
+        256,
+        FlagKind.CAUTION,
+        "the permanent displacement is negative: the block ends upslope",
+    )
+    NEAR_MODE_LIMIT = (
+        512,
+        FlagKind.CAUTION,
+        ("0.9 <= xi <= 1.1: at xi = 1 the displacement jumps to several times its value"),
+    )
+    FRICTION_ESTIMATED = (
+        1024,
+        FlagKind.NOTE,
+        "the displacement depends on lambda by Eq. 6 or delta_mu by Eqs. 10, 11",
+    )
 
 
 def flags_of(kind: FlagKind) -> Validity:
@@ -116,7 +148,8 @@ class _Status(IntEnum):
     def __new__(cls, code: int, text: str = "") -> Self:
         """A code with its text."""
         status = int.__new__(cls, code)
-        status._value_, status.text = code, text
+        status._value_ = code
+        status.text = text
         return status
 
 
@@ -127,7 +160,10 @@ class LimitStatus(_Status):
     AT_MODE_JUMP = 1, "the displacement is exceeded by the jump where the sliding mode changes"
     AT_JUMP = 2, "the displacement is exceeded by a jump within one sliding mode"
     AFTER_GAP = 3, "just below the limit the model gives no value"
-    NOT_REACHED = 4, "not reached up to the maximum amplitude, or the last one with a value (no limit)"
+    NOT_REACHED = (
+        4,
+        "not reached up to the maximum amplitude, or the last one with a value (no limit)",
+    )
     INVALID = 5, "the model gives no value at any amplitude (no limit)"
 
 
@@ -145,15 +181,25 @@ MAXIMUM_AMPLITUDE_IN_G = 5.0
 
 def _cf(units: str, long_name: str, ancillary: str | None = None, **more: str) -> dict[str, Any]:
     """CF attributes of a variable."""
-    return {"units": units, "long_name": long_name} | ({"ancillary_variables": ancillary} if ancillary else {}) | more
+    return (
+        {"units": units, "long_name": long_name}
+        | ({"ancillary_variables": ancillary} if ancillary else {})
+        | more
+    )
 
 
-def _coded(long_name: str, codes: Any, ancillary: str | None = None, key: str = "flag_values") -> dict[str, Any]:
+def _coded(
+    long_name: str, codes: Any, ancillary: str | None = None, key: str = "flag_values"
+) -> dict[str, Any]:
     """CF attributes of a variable of codes; one below 0 is that of a missing value."""
     known = [code for code in codes if code >= 0]
     meanings = " ".join(code.name.lower() for code in known)
     more = {"ancillary_variables": ancillary} if ancillary else {}
-    return {"long_name": long_name, key: [int(code) for code in known], "flag_meanings": meanings} | more
+    return {
+        "long_name": long_name,
+        key: [int(code) for code in known],
+        "flag_meanings": meanings,
+    } | more
 
 
 #: Which way u is measured.
@@ -188,21 +234,41 @@ PARAMETERS: dict[str, dict[str, Any]] = {
 DIMENSION_ORDER = (*PARAMETERS, "motion")
 
 #: Inputs of the interface, in place of which Newmark's block may have its yield coefficient alone.
-INTERFACE_INPUTS = ("theta", "mu_s", "phi", "yield_acceleration", "decay_rate", "delta_mu", "minimum_friction")
+INTERFACE_INPUTS = (
+    "theta",
+    "mu_s",
+    "phi",
+    "yield_acceleration",
+    "decay_rate",
+    "delta_mu",
+    "minimum_friction",
+)
 
 #: Inputs that the shaking has if it is a waveform, and if it is a record.
 WAVEFORM_INPUTS = ("amplitude", "displacement_amplitude", "frequency", "structure_frequency")
-RECORD_INPUTS = ("amplitude", "scale", "pgv", "arias_intensity", "time_scale", "polarity", "azimuth")
+RECORD_INPUTS = (
+    "amplitude",
+    "scale",
+    "pgv",
+    "arias_intensity",
+    "time_scale",
+    "polarity",
+    "azimuth",
+)
 
 #: Of them, those that say how strong a motion is: one of them is given.
 STRENGTHS = ("amplitude", "scale", "pgv", "arias_intensity")
 
 #: Inputs that may be drawn: all that the displacement depends on.
-DRAWN = tuple(name for name in PARAMETERS if name not in ("structure_frequency", "polarity", "azimuth"))
+DRAWN = tuple(
+    name for name in PARAMETERS if name not in ("structure_frequency", "polarity", "azimuth")
+)
 
 #: Results of a sweep: attributes of the variables.
 RESULTS: dict[str, dict[str, Any]] = {
-    "permanent_displacement": _cf("m", "permanent displacement, downslope", "validity", comment=_DIRECTION),
+    "permanent_displacement": _cf(
+        "m", "permanent displacement, downslope", "validity", comment=_DIRECTION
+    ),
     "peak_relative_velocity": _cf("m s-1", "largest downslope relative velocity", "validity"),
     "sliding_mode": _coded("sliding mode", SlidingMode, "validity"),
     "validity": _coded("validity flags; 0 = no flag raised", Validity, key="flag_masks"),
@@ -220,18 +286,26 @@ RESULTS: dict[str, dict[str, Any]] = {
 }
 
 #: The target of `limit_amplitude`.
-TOLERABLE_DISPLACEMENT: dict[str, Any] = {"units": "m", "long_name": "tolerable permanent displacement"}
+TOLERABLE_DISPLACEMENT: dict[str, Any] = {
+    "units": "m",
+    "long_name": "tolerable permanent displacement",
+}
 
 #: Results of `limit_amplitude`; sliding mode and validity go with them.
 LIMIT_RESULTS: dict[str, dict[str, Any]] = {
     "limit_amplitude": _cf(
-        "m s-2", "smallest peak ground acceleration that reaches the tolerable displacement", "limit_status"
+        "m s-2",
+        "smallest peak ground acceleration that reaches the tolerable displacement",
+        "limit_status",
     ),
     "limit_status": _coded("how the limit amplitude was found", LimitStatus),
-    "permanent_displacement": _cf("m", "permanent displacement, downslope, at the limit amplitude", "validity"),
+    "permanent_displacement": _cf(
+        "m", "permanent displacement, downslope, at the limit amplitude", "validity"
+    ),
 }
 
-#: Results of a record, further to the displacement, the velocity and the validity: -1 where there is no value.
+#: Results of a record, further to the displacement, the velocity and the validity: -1 where there
+#: is no value.
 RECORD_COUNTS: dict[str, dict[str, Any]] = {
     "number_of_slips": _cf("1", "number of slips that begin at rest", "validity"),
     "stick_slip_pulses": _cf("1", "number of pulses in stick-slip mode", "validity"),
@@ -266,14 +340,17 @@ MOTION_COORDINATES: dict[str, dict[str, Any]] = {
     **{f"motion_{name}": about for name, about in INTENSITY_MEASURES.items()},
 }
 
-#: Of them, long texts, that no table repeats in every row: `slipsweep info` and the file itself tell them.
+#: Of them, long texts, that no table repeats in every row: `slipsweep info` and the file itself
+#: tell them.
 MOTION_FILES = ("motion_file", "motion_sha256")
 
 #: The record itself, in the files of results: what is read back to repeat a run.
 RECORD_SAMPLES: dict[str, dict[str, Any]] = {
     "record_time": _cf("s", "time of a sample of the record"),
     "record_acceleration": _cf(
-        "m s-2", "recorded acceleration of the base, at scale and polarity 1", coordinates="record_time"
+        "m s-2",
+        "recorded acceleration of the base, at scale and polarity 1",
+        coordinates="record_time",
     ),
 }
 
@@ -283,12 +360,14 @@ STATISTIC_COORDINATES: dict[str, dict[str, Any]] = {
     "threshold": _cf("m", "displacement to exceed"),
     "mode": {"units": "1", **_coded("sliding mode", SlidingMode)},
     "flag": {"units": "1", **_coded("flag of the validity", Validity)},
-    "input": {"long_name": "uncertain input; inputs that are correlated are one, with + between them"},
+    "input": {
+        "long_name": "uncertain input; inputs that are correlated are one, with + between them"
+    },
     "bound": _cf("1", "probability below an end of an interval"),
 }
 
-#: Statistics of `sample`.  Quantiles and mean are of the samples that have a value; probabilities also count the
-#: statically unstable samples, as exceeding every threshold.
+#: Statistics of `sample`.  Quantiles and mean are of the samples that have a value; probabilities
+#: also count the statically unstable samples, as exceeding every threshold.
 STATISTICS: dict[str, dict[str, Any]] = {
     "displacement_quantile": _cf("m", "quantile of the permanent displacement", "valueless_share"),
     "mean_displacement": _cf("m", "mean permanent displacement", "valueless_share"),
@@ -298,14 +377,23 @@ STATISTICS: dict[str, dict[str, Any]] = {
     "mode_share": _cf("1", "share of the samples in a sliding mode"),
     "flag_share": _cf("1", "share of the samples with a flag"),
     "valueless_share": _cf("1", "share of the samples without a value"),
-    "first_order_index": _cf("1", "first-order Sobol index of the permanent displacement", "sensitivity_status"),
-    "first_order_interval": _cf("1", "95 % interval of the first-order Sobol index", "sensitivity_status"),
-    "total_index": _cf("1", "total Sobol index of the permanent displacement", "sensitivity_status"),
+    "first_order_index": _cf(
+        "1", "first-order Sobol index of the permanent displacement", "sensitivity_status"
+    ),
+    "first_order_interval": _cf(
+        "1", "95 % interval of the first-order Sobol index", "sensitivity_status"
+    ),
+    "total_index": _cf(
+        "1", "total Sobol index of the permanent displacement", "sensitivity_status"
+    ),
     "total_interval": _cf("1", "95 % interval of the total Sobol index", "sensitivity_status"),
-    "sensitivity_status": _coded("whether there are Sobol indices, or why there are none", SensitivityStatus),
+    "sensitivity_status": _coded(
+        "whether there are Sobol indices, or why there are none", SensitivityStatus
+    ),
 }
 
-#: Statistics over the motions of a suite; all but counts and shares are of the motions that have a value.
+#: Statistics over the motions of a suite; all but counts and shares are of the motions that have a
+#: value.
 SUITE_STATISTICS: dict[str, dict[str, Any]] = {
     "value_count": _cf("1", "number of motions with a value"),
     "valueless_count": _cf("1", "number of motions without a value"),
@@ -313,22 +401,32 @@ SUITE_STATISTICS: dict[str, dict[str, Any]] = {
     "valueless_share": _cf("1", "share of the motions without a value"),
     "zero_probability": _cf("1", "probability of zero permanent displacement", "valueless_share"),
     "nonzero_median": _cf("m", "median of the non-zero permanent displacements", "valueless_share"),
-    "nonzero_geometric_mean": _cf("m", "geometric mean of the non-zero permanent displacements", "valueless_share"),
+    "nonzero_geometric_mean": _cf(
+        "m", "geometric mean of the non-zero permanent displacements", "valueless_share"
+    ),
     "log_standard_deviation": _cf(
-        "1", "standard deviation of ln u of the non-zero permanent displacements u", "valueless_share"
+        "1",
+        "standard deviation of ln u of the non-zero permanent displacements u",
+        "valueless_share",
     ),
     "displacement_quantile": STATISTICS["displacement_quantile"],
     "exceedance_probability": STATISTICS["exceedance_probability"],
 }
 
-#: The mean annual rate at which a displacement is exceeded, and its parts that lie outside of the grid's amplitudes.
+#: The mean annual rate at which a displacement is exceeded, and its parts that lie outside of the
+#: grid's amplitudes.
 HAZARD_RESULTS: dict[str, dict[str, Any]] = {
     "annual_rate": _cf(
-        "year-1", "mean annual rate of exceeding a permanent displacement", "held_rate omitted_rate valueless_share"
+        "year-1",
+        "mean annual rate of exceeding a permanent displacement",
+        "held_rate omitted_rate valueless_share",
     ),
-    "held_rate": _cf("year-1", "part of it above the largest amplitude, where the probability is held constant"),
+    "held_rate": _cf(
+        "year-1", "part of it above the largest amplitude, where the probability is held constant"
+    ),
     "omitted_rate": _cf(
-        "year-1", "upper bound of the part below the smallest amplitude, where the probability is taken as 0"
+        "year-1",
+        "upper bound of the part below the smallest amplitude, where the probability is taken as 0",
     ),
     "lower_rate": _cf("year-1", "annual rate with the lower probability of each two amplitudes"),
     "upper_rate": _cf("year-1", "annual rate with the higher probability of each two amplitudes"),
@@ -347,12 +445,22 @@ RESULT_DTYPES: dict[str, str] = {
 
 #: What `sweep` returns where no variables are named; of a suite also the factor on each motion.
 DEFAULT_RESULTS = ("permanent_displacement", "peak_relative_velocity", "sliding_mode", "validity")
-DEFAULT_RECORD_RESULTS = ("permanent_displacement", "peak_relative_velocity", *RECORD_COUNTS, "validity")
+DEFAULT_RECORD_RESULTS = (
+    "permanent_displacement",
+    "peak_relative_velocity",
+    *RECORD_COUNTS,
+    "validity",
+)
 
 #: The parameters of Eqs. 7-11.
 FRICTION_PARAMETERS = (
-    "yield_acceleration", "limiting_acceleration", "acceleration_ratio", "minimum_friction", "delta_mu", "decay_rate",
-)  # fmt: skip
+    "yield_acceleration",
+    "limiting_acceleration",
+    "acceleration_ratio",
+    "minimum_friction",
+    "delta_mu",
+    "decay_rate",
+)
 
 #: Variables of a time history.
 HISTORY: dict[str, dict[str, Any]] = {
@@ -369,7 +477,8 @@ HALF_WAVES: dict[str, dict[str, Any]] = {
     "half_wave_end": _cf("s", "time at which it falls through zero"),
     "half_wave_peak": _cf("m s-2", "largest acceleration of the base between"),
     "half_wave_mode": _coded(
-        "sliding mode that the peak decides; stuck where it does not exceed the yield acceleration", SlidingMode
+        "sliding mode that the peak decides; stuck where it does not exceed the yield acceleration",
+        SlidingMode,
     ),
 }
 

@@ -1,8 +1,9 @@
 """A waveform, or a record, cut into the pieces that the solvers go through (`pieces.Wave`).
 
-The shaking is cut where w jumps, bends, turns and passes 0, so that w is monotone, smooth and of one sign on each piece
-(and further where a smooth one would be too long for its polynomial).  From the end of a piece to the beginning of the
-next w may jump; before the first piece and after the last the base is at rest.
+The shaking is cut where w jumps, bends, turns and passes 0, so that w is monotone, smooth and of
+one sign on each piece (and further where a smooth one would be too long for its polynomial).  From
+the end of a piece to the beginning of the next w may jump; before the first piece and after the
+last the base is at rest.
 """
 
 import bisect
@@ -20,16 +21,20 @@ from slipsweep.motion.pieces import Wave, pieces_of, wave_of_pieces
 from slipsweep.motion.records import Record
 from slipsweep.motion.waveforms import Harmonics, Waveform
 
-#: Longest piece of a smooth wave, in radians of its fastest harmonic, and terms of its Taylor series about
-#: the anchor: the first one beyond is 1.3e-18 (docs/numerics.md#pieces-of-a-wave).
+#: Longest piece of a smooth wave, in radians of its fastest harmonic, and terms of its Taylor
+#: series about the anchor: the first one beyond is 1.3e-18 (docs/numerics.md#pieces-of-a-wave).
 _LONGEST = 0.5 * math.pi
 TERMS = 22
 
-#: Points of a cycle closer than this, as parts of it, are one; so are values of w closer than the second.
-_SAME, _ROUNDING = 1e-12, 1e-15
+#: Points of a cycle closer than this, as parts of it, are one; so are values of w closer than the
+#: second.
+_SAME = 1e-12
+_ROUNDING = 1e-15
 
-#: Intervals that are searched in each period of the fastest harmonic, and the highest derivative whose zeros part them.
-_INTERVALS, _HIGHEST = 12, 4
+#: Intervals that are searched in each period of the fastest harmonic, and the highest derivative
+#: whose zeros part them.
+_INTERVALS = 12
+_HIGHEST = 4
 
 # 80-bit numbers where the machine has them: coefficients then are right to the last digit
 _Extended = np.longdouble
@@ -43,8 +48,8 @@ Derivative = Callable[[Exact, int], Exact]
 def _period(waveform: Waveform) -> tuple[Sequence[float], Sequence[Derivative], int, bool]:
     """Where a cycle without ramps breaks, what gives the derivatives of w behind each break, the fastest multiple.
 
-    Places are parts of the cycle, derivatives are by phase in radians; the multiple is 0 where w is straight.  Last,
-    whether w is a sine of whatever phase, whose pieces have closed forms.
+    Places are parts of the cycle, derivatives are by phase in radians; the multiple is 0 where w is
+    straight.  Last, whether w is a sine of whatever phase, whose pieces have closed forms.
     """
     quarters = (0.0, 0.25, 0.5, 0.75, 1.0)
     if waveform.name == "triangle":
@@ -52,7 +57,12 @@ def _period(waveform: Waveform) -> tuple[Sequence[float], Sequence[Derivative], 
     if waveform.name == "square":
         return (0.0, 0.5, 1.0), [_line(0.0, 1.0, 0.0), _line(0.5, -1.0, 0.0)], 0, False
     if not isinstance(waveform, Harmonics):
-        return quarters, [_sum_of_sines([1.0], [1], [{"sine": 0.0, "cosine": 90.0}[waveform.name]])] * 4, 1, True
+        return (
+            quarters,
+            [_sum_of_sines([1.0], [1], [{"sine": 0.0, "cosine": 90.0}[waveform.name]])] * 4,
+            1,
+            True,
+        )
     assert waveform.phases is not None
     fastest = max(waveform.multiples)
     wave = _sum_of_sines(waveform.amplitudes, waveform.multiples, waveform.phases)
@@ -65,12 +75,18 @@ def _period(waveform: Waveform) -> tuple[Sequence[float], Sequence[Derivative], 
 def _line(start: float, first: float, slope: float) -> Derivative:
     """A straight line from a place on, its slope by cycle."""
     line = np.polynomial.Polynomial(np.array([first, slope], _Extended))
-    return lambda u, order: line.deriv(max(order, 0))(u - _Extended(start)) / _TWO_PI ** max(order, 0)
+    return lambda u, order: (
+        line.deriv(max(order, 0))(u - _Extended(start)) / _TWO_PI ** max(order, 0)
+    )
 
 
-def _sum_of_sines(amplitudes: Sequence[float], multiples: Sequence[int], phases: Sequence[float]) -> Derivative:
+def _sum_of_sines(
+    amplitudes: Sequence[float], multiples: Sequence[int], phases: Sequence[float]
+) -> Derivative:
     """Σ aₖ sin(mₖφ + pₖ), with the largest aₖ as the unit."""
-    a, m, p = (np.array(column, _Extended)[:, np.newaxis] for column in (amplitudes, multiples, phases))
+    a, m, p = (
+        np.array(column, _Extended)[:, np.newaxis] for column in (amplitudes, multiples, phases)
+    )
     a /= np.abs(a).max()
 
     def derivative(u: Exact, order: int) -> Exact:
@@ -85,29 +101,40 @@ def _sum_of_sines(amplitudes: Sequence[float], multiples: Sequence[int], phases:
 def _edges(low: float, high: float, fastest: int) -> Exact:
     """Edges of the intervals that are searched, the inner ones where no plain wave has a zero."""
     count = max(2, math.ceil(_INTERVALS * max(fastest, 1) * (high - low)))
-    return np.concatenate([[low], low + (high - low) * (np.arange(count) + 0.381966) / count, [high]])
+    return np.concatenate(
+        [[low], low + (high - low) * (np.arange(count) + 0.381966) / count, [high]]
+    )
 
 
 def _sign_changes(derivative: Derivative, lowest: int, edges: Exact) -> list[Exact]:
     """Places between the edges where derivatives change sign, ascending, of the orders from the lowest on.
 
-    Bracketed, the highest order first: between two places where the next derivative does so this one is monotone, and
-    passes 0 once at most.  Then by Newton's iteration, guarded as that of `kernels.events`.
+    Bracketed, the highest order first: between two places where the next derivative does so this
+    one is monotone, and passes 0 once at most.  Then by Newton's iteration, guarded as that of
+    `kernels.events`.
     """
     found: list[Exact] = []
     for order in range(_HIGHEST, lowest - 1, -1):
         below = derivative(edges, order) < 0
         at = np.flatnonzero(below[:-1] != below[1:])
-        low, high = edges[at], edges[at + 1]
-        zero, last, before = 0.5 * (low + high), high - low, high - low
+        low = edges[at]
+        high = edges[at + 1]
+        zero = 0.5 * (low + high)
+        last = high - low
+        before = high - low
         while (moves := last > np.finfo(float).eps).any():
             value, slope = (derivative(zero, one).astype(float) for one in (order, order + 1))
             same = (value < 0) == below[at]
-            low, high = np.where(same, zero, low), np.where(same, high, zero)
-            new = zero - np.divide(value, 2.0 * math.pi * slope, out=np.full_like(value, np.inf), where=slope != 0)
+            low = np.where(same, zero, low)
+            high = np.where(same, high, zero)
+            new = zero - np.divide(
+                value, 2.0 * math.pi * slope, out=np.full_like(value, np.inf), where=slope != 0
+            )
             safe = (low <= new) & (new <= high) & (2 * np.abs(new - zero) <= before)
             new = np.where(safe, new, 0.5 * (low + high))
-            zero, last, before = np.where(moves, new, zero), moves * np.abs(new - zero), last
+            before = last
+            last = moves * np.abs(new - zero)
+            zero = np.where(moves, new, zero)
         found.insert(0, zero)
         edges = np.sort(np.concatenate([edges, zero]))
     return found
@@ -116,7 +143,9 @@ def _sign_changes(derivative: Derivative, lowest: int, edges: Exact) -> list[Exa
 def _pieces(waveform: Waveform, n: int) -> tuple[Exact, ...]:
     """The pieces of cycle n, as `_monotone_pieces` gives them."""
     breaks, derivatives, fastest, _ = _period(waveform.plain)
-    rise, fall, left = _Extended(waveform.ramp_in), _Extended(waveform.ramp_out), waveform.cycles - n
+    rise = _Extended(waveform.ramp_in)
+    fall = _Extended(waveform.ramp_out)
+    left = waveform.cycles - n
     places = [*breaks]
     for place in (float(rise - n), float(left - fall)):
         if 0.0 < place < 1.0 and min(abs(place - other) for other in places) > _SAME:
@@ -135,11 +164,14 @@ def _pieces(waveform: Waveform, n: int) -> tuple[Exact, ...]:
 def _ramped(plain: Derivative, low: float, scale: Any, rate: Any) -> Derivative:
     """A wave times its ramp, a straight line: `scale` at `low`, and of slope `rate` by phase."""
     return lambda u, order: (
-        (scale + rate * (u - _Extended(low)) * _TWO_PI) * plain(u, order) + order * rate * plain(u, order - 1)
+        (scale + rate * (u - _Extended(low)) * _TWO_PI) * plain(u, order)
+        + order * rate * plain(u, order - 1)
     )
 
 
-def _monotone_pieces(derivative: Derivative, fastest: int, low: float, high: float) -> tuple[Exact, ...]:
+def _monotone_pieces(
+    derivative: Derivative, fastest: int, low: float, high: float
+) -> tuple[Exact, ...]:
     """The pieces between two places of a smooth wave: start, end, first, last, coefficients, in cycles."""
     zeros, turns, *_ = _sign_changes(derivative, 0, _edges(low, high, fastest))
     points = [low]
@@ -150,7 +182,9 @@ def _monotone_pieces(derivative: Derivative, fastest: int, low: float, high: flo
             points += [a + (b - a) * part / parts for part in range(1, parts)] + [b]
 
     places = np.array(points)
-    series = np.array([derivative(places, order) / math.factorial(order) for order in range(TERMS + 1)])
+    series = np.array(
+        [derivative(places, order) / math.factorial(order) for order in range(TERMS + 1)]
+    )
     for row, exact in zip(series, (zeros, turns), strict=False):
         row[(np.abs(places[:, np.newaxis] - exact) <= _SAME).any(axis=1)] = 0
     values = series[0].astype(np.float64)
@@ -163,12 +197,15 @@ def _monotone_pieces(derivative: Derivative, fastest: int, low: float, high: flo
 @functools.lru_cache(maxsize=32)
 def wave_of(waveform: Waveform) -> Wave:
     """The table of pieces of a waveform."""
-    cycles, (*_, is_sine) = waveform.cycles, _period(waveform.plain)
+    cycles = waveform.cycles
+    (*_, is_sine) = _period(waveform.plain)
     _, _, first, last, _ = plain = _pieces(waveform.plain, 0)
     wraps = int(first[0] > 0.0 and last[-1] > 0.0)
-    # an interval that runs over from one cycle to the next makes the first cycle differ from the others
+    # an interval that runs over from one cycle to the next makes the first cycle differ from the
+    # others
     lead = min(math.ceil(waveform.ramp_in) + wraps, cycles)
-    # the last plain cycle stands apart, as another does not follow; where intervals run over, so does the one before
+    # the last plain cycle stands apart, as another does not follow; where intervals run over, so
+    # does the one before
     tail = min(math.ceil(waveform.ramp_out) + 1 + wraps, cycles - lead)
     repeats = cycles - lead - tail
     numbers = [*range(lead), *([lead] if repeats else []), *range(cycles - tail, cycles)]
@@ -183,7 +220,9 @@ def wave_of(waveform: Waveform) -> Wave:
         start=cycle + 2.0 * math.pi * start,
         end=cycle + 2.0 * math.pi * end,
         length=2.0 * math.pi * (end - start),
-        first=np.where(np.abs(first - before) < _ROUNDING, before, first),  # two cycles' roundings are no jump
+        first=np.where(
+            np.abs(first - before) < _ROUNDING, before, first
+        ),  # two cycles' roundings are no jump
         last=last,
         coefficients=coefficients,
         arc=np.repeat([is_sine and not own for own in ramped], counts),
@@ -192,7 +231,8 @@ def wave_of(waveform: Waveform) -> Wave:
     return wave_of_pieces(table, np.cumsum([0, *counts]), shape, lead, repeats)
 
 
-#: Tables of pieces that are kept, and bytes of a sample in one, about: a line through zero is two pieces.
+#: Tables of pieces that are kept, and bytes of a sample in one, about: a line through zero is two
+#: pieces.
 MOST_TABLES = 16
 TABLE_BYTES = 160
 
@@ -200,13 +240,16 @@ TABLE_BYTES = 160
 @functools.lru_cache(maxsize=MOST_TABLES)
 def wave_of_record(record: Record, polarity: float) -> Wave:
     """The table of pieces of a record, a wave of straight lines: w in m/s², and time in place of the phase."""
-    times, values = record.times, polarity * record.acceleration
-    spacing, change = spacing_of(times), np.diff(values)
+    times = record.times
+    values = polarity * record.acceleration
+    spacing = spacing_of(times)
+    change = np.diff(values)
     crosses = values[:-1] * np.sign(values[1:]) < 0.0
     own = np.repeat(np.arange(spacing.size), 1 + crosses)  # a line through zero is two pieces
     after = np.concatenate([[False], own[1:] == own[:-1]])
     before = crosses[own] & ~after
-    first, last = np.where(after, 0.0, values[own]), np.where(before, 0.0, values[own + 1])
+    first = np.where(after, 0.0, values[own])
+    last = np.where(before, 0.0, values[own + 1])
     part = np.divide(last - first, change[own], out=np.ones(own.size), where=crosses[own])
     length = spacing[own] * np.abs(part)
     pieces = pieces_of(

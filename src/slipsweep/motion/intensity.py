@@ -1,9 +1,10 @@
 """Intensity measures of a recorded motion, by the definitions of the literature.
 
-Acceleration is interpolated linearly between samples, and v = d = 0 at the first one: velocity is then a parabola on
-each interval and displacement a cubic, and every integral and extreme below is theirs, exact to rounding, at any
-sampling, even or not.  (The mean period alone is defined by a discrete Fourier transform.)  Nothing is taken off the
-acceleration but what `baseline` took off when it was read.  "g" is standard gravity.
+Acceleration is interpolated linearly between samples, and v = d = 0 at the first one: velocity is
+then a parabola on each interval and displacement a cubic, and every integral and extreme below is
+theirs, exact to rounding, at any sampling, even or not.  (The mean period alone is defined by a
+discrete Fourier transform.)  Nothing is taken off the acceleration but what `baseline` took off
+when it was read.  "g" is standard gravity.
 """
 
 import math
@@ -21,7 +22,9 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 #: Frequencies that the mean period is of, Hz, and their largest spacing (Rathje et al. 1998, 2004).
-_LOWEST, _HIGHEST, _SPACING = 0.25, 20.0, 0.05
+_LOWEST = 0.25
+_HIGHEST = 20.0
+_SPACING = 0.05
 
 #: Sampling of a motion whose own is not even, s.
 _RESAMPLED = 0.005
@@ -43,10 +46,12 @@ def intensity_measures(times: Floats, acceleration: Floats) -> dict[str, float]:
 def strength_factor(times: Floats, acceleration: Floats, given: Mapping[str, Any]) -> Any:
     """What the acceleration of a record is multiplied by, for the strength that is given, and `time_scale`.
 
-    The strength is one of `scale`, `amplitude` (m/s²), `pgv` (m/s) and `arias_intensity` (m/s).  The last two grow with
-    the time scale: the target is that of the motion as it shakes the base.
+    The strength is one of `scale`, `amplitude` (m/s²), `pgv` (m/s) and `arias_intensity` (m/s).
+    The last two grow with the time scale: the target is that of the motion as it shakes the base.
     """
-    with np.errstate(divide="ignore", invalid="ignore"):  # of a motion that is zero throughout: refused by name
+    with np.errstate(
+        divide="ignore", invalid="ignore"
+    ):  # of a motion that is zero throughout: refused by name
         if "scale" in given:
             return given["scale"]
         if "amplitude" in given:
@@ -84,13 +89,19 @@ def significant_duration(times: Floats, acceleration: Floats) -> float:
     """Time between 5 % and 95 % of the Arias intensity, s (Trifunac and Brady 1975)."""
     from scipy.optimize import brentq
 
-    energy, (first, last) = _energy(times, acceleration), (times[0], times[-1])
+    energy = _energy(times, acceleration)
+    (first, last) = (times[0], times[-1])
     total = float(energy(last))
     if not total > 0.0:
         return 0.0
 
     def reached(share: float) -> float:
-        return brentq(lambda time: float(energy(time)) - share * total, first, last, xtol=1e-15 * (last - first))
+        return brentq(
+            lambda time: float(energy(time)) - share * total,
+            first,
+            last,
+            xtol=1e-15 * (last - first),
+        )
 
     return reached(0.95) - reached(0.05)
 
@@ -98,12 +109,15 @@ def significant_duration(times: Floats, acceleration: Floats) -> float:
 def mean_period(times: Floats, acceleration: Floats) -> float:
     """Mean period Tm = Σ Cᵢ²/fᵢ / Σ Cᵢ², s, over 0.25 Hz ≤ fᵢ ≤ 20 Hz (Rathje, Abrahamson and Bray 1998).
 
-    Cᵢ are the amplitudes of the discrete Fourier transform, at frequencies at most 0.05 Hz apart: a motion shorter
-    than 20 s is continued with zeros (Rathje et al. 2004).  One that is not evenly sampled is sampled anew, at its
-    median interval or, if that is longer, every 0.005 s.  NaN of a motion without such frequencies.
+    Cᵢ are the amplitudes of the discrete Fourier transform, at frequencies at most 0.05 Hz apart: a
+    motion shorter than 20 s is continued with zeros (Rathje et al. 2004).  One that is not evenly
+    sampled is sampled anew, at its median interval or, if that is longer, every 0.005 s.  NaN of a
+    motion without such frequencies.
     """
     spacing = spacing_of(times)
-    step = float(spacing[0]) if np.ptp(spacing) == 0.0 else min(float(np.median(spacing)), _RESAMPLED)
+    step = (
+        float(spacing[0]) if np.ptp(spacing) == 0.0 else min(float(np.median(spacing)), _RESAMPLED)
+    )
     samples = np.interp(np.arange(times[0], times[-1] + 1e-6 * step, step), times, acceleration)
     length = max(samples.size, math.ceil(1.0 / (_SPACING * step)))
     frequency = np.fft.rfftfreq(length, step)
@@ -115,11 +129,16 @@ def mean_period(times: Floats, acceleration: Floats) -> float:
 def spacing_of(times: Floats) -> Floats:
     """The intervals between samples: one, where the times are its multiples to rounding.
 
-    Differences of times have the rounding of the times, 1e-10 of an interval after a million samples.
+    Differences of times have the rounding of the times, 1e-10 of an interval after a million
+    samples.
     """
     even = np.linspace(times[0], times[-1], times.size)
     is_even = np.abs(times - even).max() <= 2.0 * np.spacing(np.abs(times).max())
-    return np.full(times.size - 1, (times[-1] - times[0]) / (times.size - 1)) if is_even else np.diff(times)
+    return (
+        np.full(times.size - 1, (times[-1] - times[0]) / (times.size - 1))
+        if is_even
+        else np.diff(times)
+    )
 
 
 def _lines(times: Floats, acceleration: Floats) -> "PPoly":
@@ -134,7 +153,9 @@ def _energy(times: Floats, acceleration: Floats) -> "PPoly":
     """∫ Üg² dt over time."""
     lines = _lines(times, acceleration)
     slope, first = lines.c
-    return type(lines)(np.array([slope * slope, 2.0 * slope * first, first * first]), lines.x).antiderivative()
+    return type(lines)(
+        np.array([slope * slope, 2.0 * slope * first, first * first]), lines.x
+    ).antiderivative()
 
 
 def _zeros(curve: "PPoly") -> Floats:

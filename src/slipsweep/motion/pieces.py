@@ -1,6 +1,7 @@
 """The table of pieces that every motion of the base ends as.
 
-`slipsweep.motion.cutting` cuts waveforms and records into pieces, `slipsweep.kernels.excitation` evaluates them.
+`slipsweep.motion.cutting` cuts waveforms and records into pieces, `slipsweep.kernels.excitation`
+evaluates them.
 """
 
 from typing import Any, NamedTuple, TypeAlias
@@ -12,15 +13,17 @@ from numpy.typing import ArrayLike, NDArray
 Piece: TypeAlias = np.record
 
 #: Gauss-Legendre nodes on [0, 1], two SIMD registers.
-NODES, WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(16), (1.0, 0.0), strict=True))
+NODES, WEIGHTS = (
+    (a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(16), (1.0, 0.0), strict=True)
+)
 
 
 class Wave(NamedTuple):
     """Pieces of the shaking in the order of time, and what else the solvers ask of them.
 
-    The table holds the first `lead` cycles, then one plain cycle that stands for `repeats` alike (none where `repeats`
-    is 0), then the remaining ones; phases are counted as if the plain cycle came once.  An interval is a run of pieces
-    with w > 0.
+    The table holds the first `lead` cycles, then one plain cycle that stands for `repeats` alike
+    (none where `repeats` is 0), then the remaining ones; phases are counted as if the plain cycle
+    came once.  An interval is a run of pieces with w > 0.
     """
 
     pieces: np.ndarray  # of `pieces_of`
@@ -35,14 +38,20 @@ class Wave(NamedTuple):
 
 
 def pieces_of(
-    start: NDArray[Any], end: NDArray[Any], length: NDArray[Any], first: NDArray[Any], last: NDArray[Any],
-    coefficients: NDArray[Any], arc: NDArray[Any] | bool = False,
-) -> np.ndarray:  # fmt: skip
+    start: NDArray[Any],
+    end: NDArray[Any],
+    length: NDArray[Any],
+    first: NDArray[Any],
+    last: NDArray[Any],
+    coefficients: NDArray[Any],
+    arc: NDArray[Any] | bool = False,
+) -> np.ndarray:
     """The table of pieces.  On one of them w = top + c₁τ + c₂τ² + …, τ from its anchor, its end where |w| is larger.
 
     `length` is without the rounding of `start` and `end`, and `arc` whether a piece may be one.
     """
-    power, at_end = np.arange(1, coefficients.shape[1] + 1, dtype=np.int64), np.abs(last) > np.abs(first)
+    power = np.arange(1, coefficients.shape[1] + 1, dtype=np.int64)
+    at_end = np.abs(last) > np.abs(first)
     top = np.where(at_end, last, first)
     fields: dict[str, NDArray[Any]] = {
         "start": start,  # phases of the motion
@@ -52,23 +61,33 @@ def pieces_of(
         "first": first,  # w at the beginning, the end and the anchor
         "last": last,
         "top": top,
-        "degree": np.where(coefficients != 0.0, power, 0).max(axis=1),  # 0: a plateau, 1: a straight line
-        "jumps": first > np.maximum(np.concatenate([[0.0], last[:-1]]), 0.0),  # w jumps up at its beginning
+        "degree": np.where(coefficients != 0.0, power, 0).max(
+            axis=1
+        ),  # 0: a plateau, 1: a straight line
+        "jumps": first
+        > np.maximum(np.concatenate([[0.0], last[:-1]]), 0.0),  # w jumps up at its beginning
         # a quarter of a sine about its peak, whose closed forms are shorter than its series
         "arc": arc & (np.abs(top) == 1.0) & (coefficients[:, 0] == 0.0),
         "coefficients": coefficients,  # c₁, c₂, …
-        "once": coefficients / (power + 1),  # of the first and second integral from the anchor, of τ² and τ³ on
+        "once": coefficients
+        / (power + 1),  # of the first and second integral from the anchor, of τ² and τ³ on
         "twice": coefficients / ((power + 1) * (power + 2)),
     }
     types = [(name, values.dtype, values.shape[1:]) for name, values in fields.items()]
     return np.rec.fromarrays(list(fields.values()), np.dtype((np.record, types))).view(np.ndarray)
 
 
-def wave_of_pieces(pieces: np.ndarray, cycle: ArrayLike, shape: ArrayLike, lead: int = 0, repeats: int = 0) -> Wave:
+def wave_of_pieces(
+    pieces: np.ndarray, cycle: ArrayLike, shape: ArrayLike, lead: int = 0, repeats: int = 0
+) -> Wave:
     """The wave of a table of pieces; an interval that touches zero ends."""
-    first, last = pieces["first"], pieces["last"]
-    above, top = first + last > 0.0, np.maximum(first, last)
-    parted = ~(above[:-1] & above[1:]) | ((last[:-1] == 0.0) & (first[1:] == 0.0))  # from the next piece
+    first = pieces["first"]
+    last = pieces["last"]
+    above = first + last > 0.0
+    top = np.maximum(first, last)
+    parted = ~(above[:-1] & above[1:]) | (
+        (last[:-1] == 0.0) & (first[1:] == 0.0)
+    )  # from the next piece
     starts = np.flatnonzero(above & np.append(True, parted))
     ends = np.flatnonzero(above & np.append(parted, True)) + 1
     interval = np.column_stack([starts, ends]).astype(np.int64)

@@ -27,6 +27,10 @@ class Reading(Choice):
     interval: float | None = option("sampling interval of a file without times, s", None)
     baseline: Baseline = option("what is subtracted from the accelerations", "none")
     gaps: Gaps = option("missing samples and fill values: refused, or interpolated", "refuse")
-    implausible: Implausible = option("peak above 3 g or below 0.001 g, drift of metres: refused or accepted", "refuse")
+    implausible: Implausible = option(
+        "peak above 3 g or below 0.001 g, drift of metres: refused or accepted", "refuse"
+    )
     format: Format = option("format of the file", "auto")
-    channel: int | None = option("channel of acceleration in a COSMOS file that holds several, from 1", None, least=1)
+    channel: int | None = option(
+        "channel of acceleration in a COSMOS file that holds several, from 1", None, least=1
+    )

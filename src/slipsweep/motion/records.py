@@ -12,24 +12,42 @@ from slipsweep.errors import InputError
 from slipsweep.model.parameters import LARGEST, check_choice, check_numbers, check_single, shown
 from slipsweep.motion import formats
 from slipsweep.motion.intensity import Floats, peak_displacement, peak_velocity
-from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS, Baseline, Format, Gaps, Implausible, Reading, Unit
+from slipsweep.motion.reading import (
+    STANDARD_GRAVITY,
+    UNITS,
+    Baseline,
+    Format,
+    Gaps,
+    Implausible,
+    Reading,
+    Unit,
+)
 
-#: An interval of more median ones than this is a gap.  Of fewer samples than the second, typed by hand, nothing is said
-#: but of values that cannot be.
-_GAP, _FEWEST = 5.0, 16
+#: An interval of more median ones than this is a gap.  Of fewer samples than the second, typed by
+#: hand, nothing is said but of values that cannot be.
+_GAP = 5.0
+_FEWEST = 16
 
 #: Magnitudes that programs write where they have no value.
-_FILL = np.array([999.0, 9999.0, 99999.0, 999999.0, 999.9, 999.99, 9999.9, 9999.99, 32767.0, 32768.0, 1e20, 1e30])
+_FILL = np.array(
+    [999.0, 9999.0, 99999.0, 999999.0, 999.9, 999.99, 9999.9, 9999.99, 32767.0, 32768.0, 1e20, 1e30]
+)
 
-#: A value that is held for so long (s, and samples) while the ground shakes is of a sensor that stands still.
-_HELD, _HELD_SAMPLES = 0.5, 20
+#: A value that is held for so long (s, and samples) while the ground shakes is of a sensor that
+#: stands still.
+_HELD = 0.5
+_HELD_SAMPLES = 20
 
-#: Peaks that were recorded lie between these, g: the largest ever are 2.7 horizontally, 4 vertically.
-_WEAKEST, _STRONGEST = 0.001, 3.0
+#: Peaks that were recorded lie between these, g: the largest ever are 2.7 horizontally, 4
+#: vertically.
+_WEAKEST = 0.001
+_STRONGEST = 3.0
 
-#: Displacement of the ground (m) that is a drift where the velocity at the end is more than a share of the peak's, and
-#: one that is a drift anyhow: the largest along a fault are 9.
-_DRIFT, _DRIFT_VELOCITY, _LARGEST_DISPLACEMENT = 2.0, 0.05, 10.0
+#: Displacement of the ground (m) that is a drift where the velocity at the end is more than a share
+#: of the peak's, and one that is a drift anyhow: the largest along a fault are 9.
+_DRIFT = 2.0
+_DRIFT_VELOCITY = 0.05
+_LARGEST_DISPLACEMENT = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +89,9 @@ class Record:
 
     def __post_init__(self) -> None:
         for name in ("times", "acceleration"):
-            object.__setattr__(self, name, check_numbers(f"{self.name}: {name}", getattr(self, name)))
+            object.__setattr__(
+                self, name, check_numbers(f"{self.name}: {name}", getattr(self, name))
+            )
         check_samples(self.name, self.times, {"acceleration": self.acceleration}, least=2)
         object.__setattr__(self, "attrs", dict(self.attrs))
 
@@ -84,7 +104,9 @@ class Record:
         )
 
     def __hash__(self) -> int:
-        return hash((self.name, self.times.size, float(self.times[-1]), float(self.acceleration[-1])))
+        return hash(
+            (self.name, self.times.size, float(self.times[-1]), float(self.acceleration[-1]))
+        )
 
     def __repr__(self) -> str:
         samples = f"{self.times.size} samples, {np.ptp(self.times):.6g} s"
@@ -99,7 +121,11 @@ class Record:
     def sampled(cls, acceleration: ArrayLike, interval: float, name: str = "record") -> "Record":
         """Samples of acceleration (m/s²) at a constant interval (s) from t = 0 on."""
         values = check_numbers("acceleration", acceleration)
-        return cls(check_single("interval", interval) * np.arange(values.size, dtype=np.float64), values, name)
+        return cls(
+            check_single("interval", interval) * np.arange(values.size, dtype=np.float64),
+            values,
+            name,
+        )
 
     @classmethod
     def from_obspy(
@@ -114,8 +140,9 @@ class Record:
     ) -> "Record":
         """The record in a trace of ObsPy, which reads miniSEED, SAC and some forty other formats.
 
-        `units` is that of the trace's data, which must be accelerations, not counts; masked samples are missing.
-        The record's name is by default the trace's `id`.  The other arguments, and InputError, are as `read_record`.
+        `units` is that of the trace's data, which must be accelerations, not counts; masked samples
+        are missing. The record's name is by default the trace's `id`.  The other arguments, and
+        InputError, are as `read_record`.
 
         Examples
         --------
@@ -127,13 +154,19 @@ class Record:
         Record('XX.A..HNE': 3 samples, 0.2 s, peak 2 m/s2)
         """
         try:
-            data, interval, own = trace.data, check_single("interval", trace.stats.delta), name or str(trace.id)
+            data = trace.data
+            interval = check_single("interval", trace.stats.delta)
+            own = name or str(trace.id)
         except AttributeError:
-            raise InputError(f"trace = {shown(trace)}: must be a Trace of ObsPy, one of those in a Stream") from None
+            raise InputError(
+                f"trace = {shown(trace)}: must be a Trace of ObsPy, one of those in a Stream"
+            ) from None
         check_choice("units", units, tuple(UNITS))
         if np.asarray(data).dtype.kind in "iu":
             counts = f"{own}: its data are whole numbers, counts of a digitizer"
-            raise InputError(f"{counts}: must be accelerations, such as trace.remove_response(output='ACC') leaves")
+            raise InputError(
+                f"{counts}: must be accelerations, such as trace.remove_response(output='ACC') leaves"
+            )
         values = check_numbers("trace.data", np.ma.filled(data, np.nan))
         times = interval * np.arange(values.size, dtype=np.float64)
         reading = Reading(baseline=baseline, gaps=gaps, implausible=implausible)
@@ -141,7 +174,8 @@ class Record:
 
     def corrected(self, baseline: Baseline) -> "Record":
         """The record less a constant ("mean") or a straight line ("linear", least squares); "none" leaves it."""
-        degrees, values = {"none": None, "mean": 0, "linear": 1}, self.acceleration
+        degrees = {"none": None, "mean": 0, "linear": 1}
+        values = self.acceleration
         if (degree := degrees[check_choice("baseline", baseline, degrees)]) is not None:
             values = values - np.polynomial.Polynomial.fit(self.times, values, degree)(self.times)
         return replace(self, acceleration=values, attrs=self.attrs | {"baseline": baseline})
@@ -156,7 +190,9 @@ class Record:
         'sweeps/data/synthetic.csv: 20 s at 0.01 s, PGA 0.35 g, PGV 0.412 m/s, read in g'
         """
         notes = {", read in ": "record_units", "; accepted: ": "record_accepted"}
-        read = "".join(text + self.attrs[name] for text, name in notes.items() if name in self.attrs)
+        read = "".join(
+            text + self.attrs[name] for text, name in notes.items() if name in self.attrs
+        )
         sampled = f"{np.ptp(self.times):.4g} s at {np.median(np.diff(self.times)):.4g} s"
         velocity = peak_velocity(self.times, self.acceleration)
         return f"{self.name}: {sampled}, PGA {self.peak / STANDARD_GRAVITY:.4g} g, PGV {velocity:.4g} m/s{read}"
@@ -166,14 +202,21 @@ def check_samples(name: str, times: Floats, columns: Mapping[str, Floats], least
     """Refuse fewer samples than `least`, columns of other lengths, numbers that are not finite, times that fall."""
     for what, values in {"time": times, **columns}.items():
         if values.ndim != 1 or values.shape != times.shape:
-            raise InputError(f"{name}: {what}: {values.shape} samples, where time has {times.shape}: must be rows")
+            raise InputError(
+                f"{name}: {what}: {values.shape} samples, where time has {times.shape}: must be rows"
+            )
         for at in np.flatnonzero(~(np.abs(values) <= LARGEST))[:1]:
-            raise InputError(f"{name}: {what} of sample {at + 1} = {values[at]}: must be finite, at most {LARGEST:g}")
+            raise InputError(
+                f"{name}: {what} of sample {at + 1} = {values[at]}: must be finite, at most {LARGEST:g}"
+            )
     if times.size < least:
         raise InputError(f"{name}: {times.size} samples: must be at least {least}")
     for at in np.flatnonzero(np.diff(times) <= 0.0)[:1]:
-        now, before = times[at + 1], times[at]
-        raise InputError(f"{name}: time of sample {at + 2} = {now:.15g}: must be greater than {before:.15g} before it")
+        now = times[at + 1]
+        before = times[at]
+        raise InputError(
+            f"{name}: time of sample {at + 2} = {now:.15g}: must be greater than {before:.15g} before it"
+        )
 
 
 def read_record(
@@ -194,20 +237,23 @@ def read_record(
     path : str or Path
         The file.
     units : {"m/s2", "g", "cm/s2", "gal"}, optional
-        Unit of the file's accelerations.  Needed unless the file names it; a unit that contradicts the file's own is
-        refused.  "g" is standard gravity, 9.80665 m/s².
+        Unit of the file's accelerations.  Needed unless the file names it; a unit that contradicts
+        the file's own is refused.  "g" is standard gravity, 9.80665 m/s².
     interval : float, optional
         Sampling interval of a file that holds accelerations without times, s.
     baseline : {"none", "mean", "linear"}
         What is subtracted from the accelerations.
     gaps : {"refuse", "linear"}
-        Missing samples: an interval of more than five times the median, blank cells, fill values such as -999 and 9999,
-        a value that is held for half a second and longer.  "linear" interpolates between the others.
+        Missing samples: an interval of more than five times the median, blank cells, fill values
+        such as -999 and 9999, a value that is held for half a second and longer.  "linear"
+        interpolates between the others.
     implausible : {"refuse", "accept"}
-        A peak above 3 g or below 0.001 g, which is often that of a wrong unit, and ground that drifts by metres.
+        A peak above 3 g or below 0.001 g, which is often that of a wrong unit, and ground that
+        drifts by metres.
     format : {"auto", "csv", "values", "at2", "esm", "cosmos", "knet"}
-        "auto" looks into the file; "values" are accelerations alone; "cosmos" is the Strong Motion Data Format 1.20 of
-        the Consortium of Organizations for Strong-Motion Observation Systems (2001).
+        "auto" looks into the file; "values" are accelerations alone; "cosmos" is the Strong Motion
+        Data Format 1.20 of the Consortium of Organizations for Strong-Motion Observation Systems
+        (2001).
     channel : int, optional
         Which channel of acceleration in a COSMOS file, from 1; needed where it holds several.
 
@@ -218,7 +264,8 @@ def read_record(
     Raises
     ------
     InputError
-        The file cannot be read, or something in it is no record: with the number of the line, or the time.
+        The file cannot be read, or something in it is no record: with the number of the line, or
+        the time.
 
     See Also
     --------
@@ -241,25 +288,33 @@ def read_record(
     return _inspected(str(path), times, values, unit, reading, attrs)
 
 
-def _inspected(name: str, times: Floats, values: Floats, unit: str, reading: Reading, attrs: dict[str, str]) -> Record:
+def _inspected(
+    name: str, times: Floats, values: Floats, unit: str, reading: Reading, attrs: dict[str, str]
+) -> Record:
     """The record of values in a unit; what is found in it is refused, unless `reading` accepts it."""
     kept = ~_is_fill(values)
     missing = "; ".join((*missing_samples(times, values), *_held(times[kept], values[kept])))
     if missing and reading.gaps == "refuse":
-        raise InputError(f"{name}: {missing}: samples are missing; gaps = 'linear' interpolates between the others")
+        raise InputError(
+            f"{name}: {missing}: samples are missing; gaps = 'linear' interpolates between the others"
+        )
     record = Record(times[kept], values[kept] * UNITS[unit], name, attrs | {"record_units": unit})
     record = record.corrected(reading.baseline)
     odd = "; ".join(_implausible(record, unit))
     if odd and reading.implausible == "refuse":
         raise InputError(f"{name}: {odd}; or implausible = 'accept' takes the record as it is")
     accepted = "; ".join(filter(None, (missing, odd)))
-    return replace(record, attrs=record.attrs | {"record_accepted": accepted}) if accepted else record
+    return (
+        replace(record, attrs=record.attrs | {"record_accepted": accepted}) if accepted else record
+    )
 
 
 def missing_samples(times: Floats, values: Floats) -> Iterator[str]:
     """Values, in any unit, that stand for missing samples, and intervals without samples."""
     if (fill := _is_fill(values)).any():
-        kinds = ", ".join("blank" if np.isnan(one) else f"{one:g}" for one in np.unique(values[fill])[:3])
+        kinds = ", ".join(
+            "blank" if np.isnan(one) else f"{one:g}" for one in np.unique(values[fill])[:3]
+        )
         yield f"{fill.sum()} fill value{'s' if fill.sum() > 1 else ''} ({kinds}), first at t = {times[fill][0]:.6g} s"
     intervals = np.diff(times)
     if intervals.size < _FEWEST or not (intervals > 0.0).all():
@@ -274,7 +329,8 @@ def missing_samples(times: Floats, values: Floats) -> Iterator[str]:
 
 def _is_fill(values: Floats) -> NDArray[np.bool_]:
     """Which values stand for missing samples."""
-    missing, magnitude = np.isnan(values), np.abs(np.nan_to_num(values))
+    missing = np.isnan(values)
+    magnitude = np.abs(np.nan_to_num(values))
     known = np.isin(magnitude, _FILL)
     others = np.flatnonzero(~known & ~missing)
     if known.any() and others.size:
@@ -284,7 +340,11 @@ def _is_fill(values: Floats) -> NDArray[np.bool_]:
     # the same number again and again, far above all others
     largest = magnitude == magnitude.max(initial=0.0)
     rest = magnitude[~largest].max(initial=0.0)
-    is_alone = largest.sum() > 1 and magnitude.max(initial=0.0) > 20.0 * rest > 0.0 and values.size > _FEWEST
+    is_alone = (
+        largest.sum() > 1
+        and magnitude.max(initial=0.0) > 20.0 * rest > 0.0
+        and values.size > _FEWEST
+    )
     return missing | (largest & is_alone)
 
 
@@ -292,8 +352,11 @@ def _held(times: Floats, values: Floats) -> Iterator[str]:
     """The first value that does not change while the ground shakes."""
     steps = np.abs(np.diff(values, prepend=np.nan, append=np.nan))
     changes = np.flatnonzero(steps != 0.0)
-    starts, lasts, jumps = changes[:-1], changes[1:] - 1, np.minimum(steps[changes[:-1]], steps[changes[1:]])
-    own, peak = values[starts], np.abs(values).max(initial=0.0)
+    starts = changes[:-1]
+    lasts = changes[1:] - 1
+    jumps = np.minimum(steps[changes[:-1]], steps[changes[1:]])
+    own = values[starts]
+    peak = np.abs(values).max(initial=0.0)
     shakes = (np.abs(own) > 0.01 * peak) | (jumps > 0.05 * peak)  # else the ground is at rest
     long = (lasts - starts >= _HELD_SAMPLES) & (times[lasts] - times[starts] >= _HELD)
     for at in np.flatnonzero(shakes & long)[:1]:
@@ -302,21 +365,32 @@ def _held(times: Floats, values: Floats) -> Iterator[str]:
 
 def _implausible(record: Record, unit: str) -> Iterator[str]:
     """A peak that was never recorded, read in `unit`, and the unit that would explain it; a ground that moves away."""
-    times, acceleration = record.times, record.acceleration
-    at, is_short = int(np.abs(acceleration).argmax()), times.size <= _FEWEST
+    times = record.times
+    acceleration = record.acceleration
+    at = int(np.abs(acceleration).argmax())
+    is_short = times.size <= _FEWEST
     peak = acceleration[at] / STANDARD_GRAVITY
     if abs(peak) > _STRONGEST or (abs(peak) < _WEAKEST and not is_short):
         in_unit = {other: abs(peak) * factor / UNITS[unit] for other, factor in UNITS.items()}
         likely = min(in_unit, key=lambda other: abs(np.log(max(in_unit[other], 1e-300) / 0.3)))
         explains = 0.02 <= in_unit[likely] <= 1.5
-        hint = f" (read in {unit}; in {likely} it would be {in_unit[likely]:.3g} g)" if explains else ""
+        hint = (
+            f" (read in {unit}; in {likely} it would be {in_unit[likely]:.3g} g)"
+            if explains
+            else ""
+        )
         limit = f"above {_STRONGEST:g} g" if abs(peak) > 1.0 else f"below {_WEAKEST:g} g"
         yield f"peak acceleration {peak:.4g} g at t = {times[at]:.6g} s{hint}: {limit}, check units and header"
     if is_short:
         return
-    displacement, end = peak_displacement(times, acceleration), float(np.trapezoid(acceleration, times))
-    moves_on = displacement > _DRIFT and abs(end) > _DRIFT_VELOCITY * peak_velocity(times, acceleration)
+    displacement = peak_displacement(times, acceleration)
+    end = float(np.trapezoid(acceleration, times))
+    moves_on = displacement > _DRIFT and abs(end) > _DRIFT_VELOCITY * peak_velocity(
+        times, acceleration
+    )
     if moves_on or displacement > _LARGEST_DISPLACEMENT:  # as the integral of an offset does
-        drift = "an offset or a drift; baseline = 'linear' takes a straight line off the acceleration"
+        drift = (
+            "an offset or a drift; baseline = 'linear' takes a straight line off the acceleration"
+        )
         at_end = f"a velocity of {end:.3g} m/s at t = {times[-1]:.6g} s"
         yield f"the ground moves {displacement:.3g} m and has {at_end}: {drift}"

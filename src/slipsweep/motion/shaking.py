@@ -20,13 +20,17 @@ from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS
 from slipsweep.motion.records import check_samples, missing_samples
 
 #: What is measured of the table, and what the block may be measured by.
-TABLE, RESPONSES = "ground_acceleration", ("block_acceleration", "relative_velocity", "relative_displacement")
+TABLE = "ground_acceleration"
+RESPONSES = ("block_acceleration", "relative_velocity", "relative_displacement")
 CHANNELS = (TABLE, *RESPONSES)
 
 #: Words of a column's name that say what it is: one of each set.
 _NAMES: dict[str, tuple[set[str], ...]] = {
     "time": ({"time", "t"},),
-    TABLE: ({"table", "ground", "plane", "base", "input"}, {"acceleration", "accelerations", "acc"}),
+    TABLE: (
+        {"table", "ground", "plane", "base", "input"},
+        {"acceleration", "accelerations", "acc"},
+    ),
     "block_acceleration": ({"block", "mass"}, {"acceleration", "accelerations", "acc"}),
     "relative_velocity": ({"relative", "rel", "sliding"}, {"velocity", "vel"}),
     "relative_displacement": ({"relative", "rel", "sliding"}, {"displacement", "disp"}),
@@ -37,10 +41,11 @@ _NAMES: dict[str, tuple[set[str], ...]] = {
 class ShakingTest:
     """What was measured in a test on a shaking table.
 
-    `times` (s) increase, at intervals that need not be equal.  `channels` are `ground_acceleration` (m/s², of the
-    table), without a gap, and any of `block_acceleration` (m/s²), `relative_velocity` (m/s) and `relative_displacement`
-    (m, downslope positive), NaN where there is no sample.  `attrs` say how it was read.  InputError: fewer than 16
-    samples, times that do not increase, a channel that is not known, or a table's acceleration that is not finite.
+    `times` (s) increase, at intervals that need not be equal.  `channels` are `ground_acceleration`
+    (m/s², of the table), without a gap, and any of `block_acceleration` (m/s²), `relative_velocity`
+    (m/s) and `relative_displacement` (m, downslope positive), NaN where there is no sample.
+    `attrs` say how it was read.  InputError: fewer than 16 samples, times that do not increase, a
+    channel that is not known, or a table's acceleration that is not finite.
     """
 
     times: Floats
@@ -52,11 +57,21 @@ class ShakingTest:
         for channel in self.channels:
             check_choice(f"{self.name}: channel", channel, CHANNELS)
         if TABLE not in self.channels:
-            raise InputError(f"{self.name}: {TABLE}: missing: the acceleration of the table must be measured")
+            raise InputError(
+                f"{self.name}: {TABLE}: missing: the acceleration of the table must be measured"
+            )
         times = check_numbers(f"{self.name}: time", self.times)
-        kept = {name: check_numbers(f"{self.name}: {name}", self.channels[name]) for name in (TABLE, *self.responses)}
-        filled = {name: np.where(np.isnan(values) & (name != TABLE), 0.0, values) for name, values in kept.items()}
-        check_samples(self.name, times, filled, least=16)  # fewer tell nothing of three parameters and their noise
+        kept = {
+            name: check_numbers(f"{self.name}: {name}", self.channels[name])
+            for name in (TABLE, *self.responses)
+        }
+        filled = {
+            name: np.where(np.isnan(values) & (name != TABLE), 0.0, values)
+            for name, values in kept.items()
+        }
+        check_samples(
+            self.name, times, filled, least=16
+        )  # fewer tell nothing of three parameters and their noise
         for name, values in kept.items():
             if np.isnan(values).all():
                 raise InputError(f"{self.name}: {name}: no sample")
@@ -73,27 +88,41 @@ class ShakingTest:
     ) -> tuple["ShakingTest", list[str]]:
         """The test less a constant (`offset`) or a straight line (`drift`) in some channels, "all" is all of them.
 
-        Constants and lines are fitted to the samples between the two times of `rest` (s), when the table and the block
-        were at rest.  Without it they are fitted to all samples, which is right for accelerations of a motion that
-        begins and ends at rest.  Also returns what was taken off each: its value at the first sample, and its slope.
+        Constants and lines are fitted to the samples between the two times of `rest` (s), when the
+        table and the block were at rest.  Without it they are fitted to all samples, which is right
+        for accelerations of a motion that begins and ends at rest.  Also returns what was taken off
+        each: its value at the first sample, and its slope.
         """
-        offset, drift = (check_channels(*one, self.channels) for one in (("offset", offset), ("drift", drift)))
-        chosen, within = np.ones(self.times.size, dtype=bool), ""
+        offset, drift = (
+            check_channels(*one, self.channels) for one in (("offset", offset), ("drift", drift))
+        )
+        chosen = np.ones(self.times.size, dtype=bool)
+        within = ""
         if rest is not None:
             bounds = [check_finite("rest", one) for one in check_list("rest", rest, "two times")]
             if len(bounds) != 2:
                 raise InputError(f"rest = {shown(rest)}: must be two times, s")
-            chosen, within = (self.times >= bounds[0]) & (self.times <= bounds[1]), f"rest = {shown(rest)}: "
-        channels, removed, since = dict(self.channels), [], self.times - self.times[0]
+            chosen = (self.times >= bounds[0]) & (self.times <= bounds[1])
+            within = f"rest = {shown(rest)}: "
+        channels = dict(self.channels)
+        removed = []
+        since = self.times - self.times[0]
         for name in (one for one in CHANNELS if one in (*offset, *drift)):
             use = chosen & np.isfinite(channels[name])
             if use.sum() < 3:
-                raise InputError(f"{within}{name}: {use.sum()} samples to fit to: must be at least 3")
-            line = np.polynomial.Polynomial.fit(since[use], channels[name][use], 1 if name in drift else 0)
+                raise InputError(
+                    f"{within}{name}: {use.sum()} samples to fit to: must be at least 3"
+                )
+            line = np.polynomial.Polynomial.fit(
+                since[use], channels[name][use], 1 if name in drift else 0
+            )
             channels[name] = channels[name] - line(since)
             constant, slope = (float(one(0.0)) for one in (line, line.deriv()))
             unit = HISTORY[name]["units"]
-            removed.append(f"{name}: {constant:.4g} {unit}" + (f" and {slope:.4g} {unit} a second" if slope else ""))
+            removed.append(
+                f"{name}: {constant:.4g} {unit}"
+                + (f" and {slope:.4g} {unit} a second" if slope else "")
+            )
         return replace(self, channels=channels), removed
 
 
@@ -104,28 +133,43 @@ def check_channels(key: str, given: Any, known: Collection[str]) -> tuple[str, .
     names = check_list(key, given, "channels")
     for name in names:
         if not isinstance(name, str) or name not in known:
-            raise InputError(f"{key} = {shown(name)}: must be 'all', or of the channels measured: {', '.join(known)}")
+            raise InputError(
+                f"{key} = {shown(name)}: must be 'all', or of the channels measured: {', '.join(known)}"
+            )
     return tuple(names)
 
 
 def read_test(path: str | Path) -> ShakingTest:
     """Read a test from a CSV file whose header names columns and units (`read_columns`); "g" is standard gravity.
 
-    Such as ``time (s), table acceleration (g), relative displacement (mm)``.  Columns of other names are left out.
-    InputError: the file cannot be read, a column has no unit, or a line holds no numbers.
+    Such as ``time (s), table acceleration (g), relative displacement (mm)``.  Columns of other
+    names are left out. InputError: the file cannot be read, a column has no unit, or a line holds
+    no numbers.
     """
     path = Path(path)
 
     def channel_of(column: str, words: set[str], unit: str) -> tuple[str, float] | None:
-        channel = next((one for one, names in _NAMES.items() if all(words & either for either in names)), None)
+        channel = next(
+            (one for one, names in _NAMES.items() if all(words & either for either in names)), None
+        )
         if channel and not unit:
-            raise InputError(f"{path}: column {shown(column)}: must give its unit in brackets, such as (m/s2)")
-        return (channel, unit_factor(f"{path}: column {column}: unit", channel, unit)) if channel else None
+            raise InputError(
+                f"{path}: column {shown(column)}: must give its unit in brackets, such as (m/s2)"
+            )
+        return (
+            (channel, unit_factor(f"{path}: column {column}: unit", channel, unit))
+            if channel
+            else None
+        )
 
     digest, lines = read_lines(path)
-    values = read_columns(path, lines, channel_of, {"time": "time (s)", TABLE: "table acceleration (m/s2)"})
+    values = read_columns(
+        path, lines, channel_of, {"time": "time (s)", TABLE: "table acceleration (m/s2)"}
+    )
     if missing := "; ".join(missing_samples(values["time"], values[TABLE])):
-        raise InputError(f"{path}: {TABLE}: {missing}: samples are missing; take the part of the test that has all")
+        raise InputError(
+            f"{path}: {TABLE}: {missing}: samples are missing; take the part of the test that has all"
+        )
     attrs = {"test": path.name.encode(errors="backslashreplace").decode(), "test_sha256": digest}
     return ShakingTest(values.pop("time"), values, str(path), attrs)
 

@@ -55,11 +55,15 @@ class Pair:
         components = {"first": self.first, "second": self.second}
         for name, own in components.items():
             if not isinstance(own, Record):
-                raise InputError(f"{name} = {shown(own)}: must be a Record, one component of a motion")
+                raise InputError(
+                    f"{name} = {shown(own)}: must be a Record, one component of a motion"
+                )
         times, other = sorted((self.first.times, self.second.times), key=np.size, reverse=True)
         # files round times: to the millionth part of an interval they are the same
         if np.abs(times[: other.size] - other).max() > 1e-6 * np.diff(other).min():
-            raise InputError(f"{self.name}: the components of a pair must be sampled at the same times")
+            raise InputError(
+                f"{self.name}: the components of a pair must be sampled at the same times"
+            )
         for name, own in components.items():
             filled = np.append(own.acceleration, np.zeros(times.size - own.times.size))
             object.__setattr__(self, name, replace(own, times=times, acceleration=filled))
@@ -77,34 +81,44 @@ class Pair:
     @property
     def attrs(self) -> dict[str, str]:
         """How the components were read: what they have in common once, else one after the other."""
-        one, other = self.first.attrs, self.second.attrs
-        return {name: " ".join(dict.fromkeys((one.get(name, ""), other.get(name, "")))) for name in {**one, **other}}
+        one = self.first.attrs
+        other = self.second.attrs
+        return {
+            name: " ".join(dict.fromkeys((one.get(name, ""), other.get(name, ""))))
+            for name in {**one, **other}
+        }
 
     def rotated(self, azimuth: float) -> Record:
         """The component at an azimuth, degrees from the first towards the second, exact between samples as at them."""
         from scipy.special import cosdg, sindg  # exact at the quarters of a turn
 
         degrees = check_single("azimuth", azimuth)
-        acceleration = cosdg(degrees) * self.first.acceleration + sindg(degrees) * self.second.acceleration
+        acceleration = (
+            cosdg(degrees) * self.first.acceleration + sindg(degrees) * self.second.acceleration
+        )
         return Record(self.times, acceleration, f"{self.name} at {degrees:g} degrees", self.attrs)
 
 
 Motion: TypeAlias = Record | Pair
-_Source: TypeAlias = tuple[Path | Record, ...]  # what a motion is read from: one part, or the components of a pair
+_Source: TypeAlias = tuple[
+    Path | Record, ...
+]  # what a motion is read from: one part, or the components of a pair
 
 
 @dataclass(frozen=True, repr=False)
 class Suite:
     """Recorded motions that shake the same blocks: the dimension `motion` of results.
 
-    ``suite["label"]``, ``suite[0]`` is one of them, ``suite[2:5]`` and ``suite[["a", "b"]]`` are suites of some.
+    ``suite["label"]``, ``suite[0]`` is one of them, ``suite[2:5]`` and ``suite[["a", "b"]]`` are
+    suites of some.
 
     Attributes
     ----------
     motions : tuple of Record or of Pair
         Of any length and sampling.  A suite of pairs wants an `azimuth`.
     labels : tuple of str
-        Labels in results, all different; by default the stems of the records' names (of the first components').
+        Labels in results, all different; by default the stems of the records' names (of the first
+        components').
     name : str
         What the suite is called in results.
 
@@ -136,12 +150,18 @@ class Suite:
             if not isinstance(motion, (Record, Pair)):
                 raise InputError(f"motions[{at}] = {shown(motion)}: must be a Record or a Pair")
         if len({type(motion) for motion in motions}) != 1:
-            raise InputError(f"motions: {len(motions)}: must be one at least, all Records or all Pairs")
+            raise InputError(
+                f"motions: {len(motions)}: must be one at least, all Records or all Pairs"
+            )
         labels = tuple(check_list("labels", self.labels, "texts"))
         labels = labels or tuple(_labels([Path(_components(one)[0].name) for one in motions]))
-        texts = {one for one in labels if isinstance(one, str) and one.strip() and one.isprintable()}
+        texts = {
+            one for one in labels if isinstance(one, str) and one.strip() and one.isprintable()
+        }
         if not len(motions) == len(labels) == len(texts):
-            raise InputError(f"labels = {shown(labels)}: must be {len(motions)} different texts that can be printed")
+            raise InputError(
+                f"labels = {shown(labels)}: must be {len(motions)} different texts that can be printed"
+            )
         object.__setattr__(self, "motions", motions)
         object.__setattr__(self, "labels", labels)
 
@@ -159,13 +179,21 @@ class Suite:
     def __getitem__(self, which: Any) -> Any:
         if not isinstance(which, (slice, list, tuple)):
             return self.motions[self.index(which)]
-        places = [self.index(one) for one in (self.labels[which] if isinstance(which, slice) else which)]
-        return Suite(tuple(self.motions[at] for at in places), tuple(self.labels[at] for at in places), self.name)
+        places = [
+            self.index(one) for one in (self.labels[which] if isinstance(which, slice) else which)
+        ]
+        return Suite(
+            tuple(self.motions[at] for at in places),
+            tuple(self.labels[at] for at in places),
+            self.name,
+        )
 
     def index(self, which: str | int) -> int:
         """The place of a motion (InputError: there is none of that label)."""
         if isinstance(which, str) and which not in self.labels:
-            raise InputError(f"motion = {shown(which)}: not in the suite; {did_you_mean(which, self.labels)}")
+            raise InputError(
+                f"motion = {shown(which)}: not in the suite; {did_you_mean(which, self.labels)}"
+            )
         return self.labels.index(which) if isinstance(which, str) else which
 
     @property
@@ -185,15 +213,27 @@ class Suite:
             "motion_file": np.array([motion.attrs.get("record", "") for motion in self]),
             "motion_sha256": np.array([motion.attrs.get("record_sha256", "") for motion in self]),
             "motion_samples": np.array([motion.times.size for motion in self], np.int32),
-            "motion_interval": np.array([np.ptp(motion.times) / (motion.times.size - 1) for motion in self]),
+            "motion_interval": np.array(
+                [np.ptp(motion.times) / (motion.times.size - 1) for motion in self]
+            ),
         }
-        return found if self.has_pairs else found | self.intensities(np.arange(len(self)), np.zeros(len(self)))
+        return (
+            found
+            if self.has_pairs
+            else found | self.intensities(np.arange(len(self)), np.zeros(len(self)))
+        )
 
     def intensities(self, places: NDArray[np.int64], azimuths: Floats) -> dict[str, Floats]:
         """Intensity measures of the motions at some places, each at its azimuth; the arrays have one shape."""
-        motions = [self.record(int(at), float(own)) for at, own in zip(places.flat, azimuths.flat, strict=True)]
+        motions = [
+            self.record(int(at), float(own))
+            for at, own in zip(places.flat, azimuths.flat, strict=True)
+        ]
         found = [intensity_measures(one.times, one.acceleration) for one in motions]
-        return {f"motion_{m}": np.reshape([one[m] for one in found], azimuths.shape) for m in INTENSITY_MEASURES}
+        return {
+            f"motion_{m}": np.reshape([one[m] for one in found], azimuths.shape)
+            for m in INTENSITY_MEASURES
+        }
 
     def record(self, at: int, azimuth: float) -> Record:
         """The motion at a place, of a pair the component at an azimuth."""
@@ -210,7 +250,9 @@ class Suite:
                 about[name] = values.pop()
         alike = defaultdict[bytes, list[str]](list)  # such as one file under two names
         for label, motion in zip(self.labels, self, strict=True):
-            samples = (one.times.tobytes() + one.acceleration.tobytes() for one in _components(motion))
+            samples = (
+                one.times.tobytes() + one.acceleration.tobytes() for one in _components(motion)
+            )
             alike[b"".join(samples)].append(label)
         if twice := [", ".join(labels) for labels in alike.values() if len(labels) > 1]:
             about["duplicate_motions"] = "; ".join(twice)
@@ -238,13 +280,15 @@ def read_suite(
     Parameters
     ----------
     paths : str, Path, Record, Pair, or list of these
-        A folder (all files in it, but for hidden ones; folders in it are not looked into), a pattern such as
-        ``"motions/*.AT2"`` (``**`` is any folder), or a list of files, folders, patterns, Records and pairs.  An entry
-        that is itself a list of two files (or Records) is a pair of horizontal components.  Files of a folder or a
-        pattern are in the order of their names; one that several entries name is one motion.
+        A folder (all files in it, but for hidden ones; folders in it are not looked into), a
+        pattern such as ``"motions/*.AT2"`` (``**`` is any folder), or a list of files, folders,
+        patterns, Records and pairs.  An entry that is itself a list of two files (or Records) is a
+        pair of horizontal components.  Files of a folder or a pattern are in the order of their
+        names; one that several entries name is one motion.
     pairs : (str, str), optional
-        Two endings of the files' stems, such as ``("_NS", "_EW")``: files that differ in these alone are the two
-        components of one motion, the first ending's at azimuth 0 and the second's at 90 degrees.
+        Two endings of the files' stems, such as ``("_NS", "_EW")``: files that differ in these
+        alone are the two components of one motion, the first ending's at azimuth 0 and the second's
+        at 90 degrees.
     units, interval, baseline, gaps, implausible, format, channel
         As `read_record`, for every file.
 
@@ -256,8 +300,8 @@ def read_suite(
     Raises
     ------
     InputError
-        Any file cannot be read, or is no record: all of them are named.  A pattern that fits no file, a folder
-        without one, or a component without the other.
+        Any file cannot be read, or is no record: all of them are named.  A pattern that fits no
+        file, a folder without one, or a component without the other.
 
     See Also
     --------
@@ -271,22 +315,29 @@ def read_suite(
     >>> slipsweep.read_suite("sweeps/data/suite", pairs=("_H1", "_H2"))
     Suite('sweeps/data/suite': 4 pairs: rock-far, rock-near, soft-far, stiff-pulse)
     """
-    return suite_in(Path(), paths, pairs, Reading(units, interval, baseline, gaps, implausible, format, channel))
+    return suite_in(
+        Path(), paths, pairs, Reading(units, interval, baseline, gaps, implausible, format, channel)
+    )
 
 
 def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Reading) -> Suite:
     """`read_suite` of paths that are relative to a folder, whose own name is not read as a pattern."""
     sources = _sources(paths, folder)
     sources, labels = (sources, ()) if pairs is None else _paired(sources, pairs)
-    records, reasons = dict[Path | Record, Record](), dict[Path | Record, str]()
+    records = dict[Path | Record, Record]()
+    reasons = dict[Path | Record, str]()
     for part in dict.fromkeys(chain.from_iterable(sources)):
         try:
-            records[part] = part if isinstance(part, Record) else read_record(part, **reading.options)
+            records[part] = (
+                part if isinstance(part, Record) else read_record(part, **reading.options)
+            )
         except InputError as error:
             reasons[part] = str(error)
     if reasons:
         names = ", ".join(part.name for part in reasons)
-        refused = InputError(f"{len(reasons)} of {len(reasons) + len(records)} files cannot be read: {names}")
+        refused = InputError(
+            f"{len(reasons)} of {len(reasons) + len(records)} files cannot be read: {names}"
+        )
         for reason in reasons.values():
             refused.add_note(reason)
         raise refused
@@ -304,14 +355,24 @@ def _components(motion: Motion) -> tuple[Record, ...]:
 def _sources(given: Any, folder: Path) -> list[_Source]:
     """What entries name, each file once."""
     what = "files, folders, patterns, pairs of files or Records"
-    parts, found = (str, Path, Record), list[_Source]()
-    for entry in [given] if isinstance(given, (str, Path, Record, Pair)) else check_list("paths", given, what):
+    parts = (str, Path, Record)
+    found = list[_Source]()
+    for entry in (
+        [given]
+        if isinstance(given, (str, Path, Record, Pair))
+        else check_list("paths", given, what)
+    ):
         if isinstance(entry, (Record, Pair)):
             found.append(_components(entry))
         elif isinstance(entry, (str, Path)):
             found += [(file,) for file in _matching(folder, entry) if (file,) not in found]
-        elif isinstance(entry, (list, tuple)) and len(entry) == sum(isinstance(one, parts) for one in entry) == 2:
-            found.append(tuple(part if isinstance(part, Record) else folder / part for part in entry))
+        elif (
+            isinstance(entry, (list, tuple))
+            and len(entry) == sum(isinstance(one, parts) for one in entry) == 2
+        ):
+            found.append(
+                tuple(part if isinstance(part, Record) else folder / part for part in entry)
+            )
         else:
             raise InputError(f"paths: {shown(entry)}: must be one of {what}")
     if not found:
@@ -320,7 +381,8 @@ def _sources(given: Any, folder: Path) -> list[_Source]:
 
 
 def _matching(folder: Path, entry: str | Path) -> list[Path]:
-    path, pattern = folder / entry, str(entry)
+    path = folder / entry
+    pattern = str(entry)
     if path.is_dir():
         pattern = f"{glob.escape(pattern)}/*"
     elif path.exists() or not glob.has_magic(pattern):
@@ -332,24 +394,41 @@ def _matching(folder: Path, entry: str | Path) -> list[Path]:
     return files
 
 
-def _paired(sources: Sequence[_Source], endings: Sequence[str]) -> tuple[list[_Source], tuple[str, ...]]:
+def _paired(
+    sources: Sequence[_Source], endings: Sequence[str]
+) -> tuple[list[_Source], tuple[str, ...]]:
     """Files put together two by two, and the labels of the pairs: what the names of both files begin with."""
-    texts = [one for one in check_list("pairs", endings, "two endings of names") if isinstance(one, str) and one]
+    texts = [
+        one
+        for one in check_list("pairs", endings, "two endings of names")
+        if isinstance(one, str) and one
+    ]
     if len(texts) != len(endings) or len({*texts}) != 2:
-        raise InputError(f"pairs = {shown(endings)}: must be two different endings of names, such as ('_NS', '_EW')")
+        raise InputError(
+            f"pairs = {shown(endings)}: must be two different endings of names, such as ('_NS', '_EW')"
+        )
     first, second = texts
     parts = list(chain.from_iterable(sources))
-    stems = {one: one.stem.removesuffix(first) for one in parts if isinstance(one, Path) and one.stem.endswith(first)}
-    pairs: list[_Source] = [(one, one.with_name(stem + second + one.suffix)) for one, stem in stems.items()]
+    stems = {
+        one: one.stem.removesuffix(first)
+        for one in parts
+        if isinstance(one, Path) and one.stem.endswith(first)
+    }
+    pairs: list[_Source] = [
+        (one, one.with_name(stem + second + one.suffix)) for one, stem in stems.items()
+    ]
     whole = {one for pair in pairs if {*pair} <= {*parts} for one in pair}
     if incomplete := ", ".join(one.name for one in parts if one not in whole):
         raise InputError(f"pairs = {shown(endings)}: without the other component: {incomplete}")
-    return pairs, tuple(_labels([one.with_name(stem.rstrip("_-. ") or one.stem) for one, stem in stems.items()]))
+    return pairs, tuple(
+        _labels([one.with_name(stem.rstrip("_-. ") or one.stem) for one, stem in stems.items()])
+    )
 
 
 def _labels(paths: Sequence[Path]) -> Iterator[str]:
     """The stems of files; with folder and ending where stems are alike, and numbered where that does not help."""
-    stems, seen = Counter(path.stem for path in paths), Counter[str]()
+    stems = Counter(path.stem for path in paths)
+    seen = Counter[str]()
     for path in paths:
         label = "/".join(path.parts[-2:]) if stems[path.stem] > 1 else path.stem.strip() or "motion"
         seen[label] += 1

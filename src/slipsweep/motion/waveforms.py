@@ -1,8 +1,9 @@
 """Waveforms: what the base does, as a user chooses it (`cutting` cuts it into the pieces that the solvers follow).
 
-A waveform w(φ) has the period 2π and the peak max|w| = 1, so that the amplitude A stays the peak ground acceleration;
-φ = ωt counts from the beginning of the shaking.  A ramp multiplies it by an envelope that grows linearly from 0 over
-the first `ramp_in` cycles, and falls to 0 over the last `ramp_out`; A is the peak without it.
+A waveform w(φ) has the period 2π and the peak max|w| = 1, so that the amplitude A stays the peak
+ground acceleration; φ = ωt counts from the beginning of the shaking.  A ramp multiplies it by an
+envelope that grows linearly from 0 over the first `ramp_in` cycles, and falls to 0 over the last
+`ramp_out`; A is the peak without it.
 """
 
 import math
@@ -27,7 +28,9 @@ class Waveform(Choice):
         """Refuse ramps longer than the shaking."""
         if self.ramp_in + self.ramp_out > self.cycles:
             ramps = number_text(self.ramp_in + self.ramp_out)
-            raise InputError(f"ramp_in + ramp_out = {ramps}: must not exceed the {self.cycles} cycles of the shaking")
+            raise InputError(
+                f"ramp_in + ramp_out = {ramps}: must not exceed the {self.cycles} cycles of the shaking"
+            )
 
     @property
     def plain(self) -> Self:
@@ -132,7 +135,9 @@ class Square(Waveform):
 @dataclass(frozen=True)
 class _Terms:  # a base of its own, as a field without a default comes first
     amplitudes: Sequence[float] = option("relative amplitudes of the harmonics")
-    multiples: Sequence[int] = option("multiples of the frequency of the harmonics", least=1, most=100)
+    multiples: Sequence[int] = option(
+        "multiples of the frequency of the harmonics", least=1, most=100
+    )
     phases: Sequence[float] | None = option("phases of the harmonics, degrees", None)
 
 
@@ -177,12 +182,16 @@ class Harmonics(Waveform, _Terms):
             object.__setattr__(self, "phases", (0.0,) * count)
         for key in ("multiples", "phases"):
             if len(getattr(self, key)) != count:
-                raise InputError(f"{key}: {len(getattr(self, key))} numbers; must be as many as amplitudes, {count}")
+                raise InputError(
+                    f"{key}: {len(getattr(self, key))} numbers; must be as many as amplitudes, {count}"
+                )
         if len(set(self.multiples)) < count:
             raise InputError(f"multiples = {list(self.multiples)}: must not be repeated")
         # terms of different multiples cannot cancel: their sum is 0 only where all are
         if not any(self.amplitudes):
-            raise InputError(f"amplitudes = {list(self.amplitudes)}: must not all be 0, and one at least")
+            raise InputError(
+                f"amplitudes = {list(self.amplitudes)}: must not all be 0, and one at least"
+            )
 
     def _words(self) -> str:
         assert self.phases is not None
@@ -191,7 +200,9 @@ class Harmonics(Waveform, _Terms):
 
 
 #: The waveforms that a user may choose.
-WAVEFORMS = Family[Waveform]("excitation", "waveform", (Sine, Cosine, Triangle, Square, Harmonics), "sine", "waveform")
+WAVEFORMS = Family[Waveform](
+    "excitation", "waveform", (Sine, Cosine, Triangle, Square, Harmonics), "sine", "waveform"
+)
 
 
 def peak_acceleration(displacement_amplitude: Any, frequency: Any) -> Any:

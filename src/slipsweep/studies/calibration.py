@@ -16,12 +16,15 @@ from slipsweep.studies.estimate import Estimate, cycle_estimate, estimate
 from slipsweep.studies.friction import Floats
 from slipsweep.studies.likelihood import SOUGHT, Observation, runs_of
 
-#: The peak of a cycle at least, and what a table that moves exceeds, in parts of its largest acceleration; fewest
-#: samples of a cycle.
-_A_CYCLE, _MOVES, _FEWEST_IN_A_CYCLE = 0.1, 0.1, 12
+#: The peak of a cycle at least, and what a table that moves exceeds, in parts of its largest
+#: acceleration; fewest samples of a cycle.
+_A_CYCLE = 0.1
+_MOVES = 0.1
+_FEWEST_IN_A_CYCLE = 12
 
 #: Symbols and units of what is sought.
-_SYMBOL, _UNIT = ("Üy", "λ", "Δμ"), (" m/s2", "", "")
+_SYMBOL = ("Üy", "λ", "Δμ")
+_UNIT = (" m/s2", "", "")
 
 _ANOTHER = "Test at another amplitude and give calibrate all tests together"
 
@@ -40,22 +43,25 @@ def calibrate(
 ) -> xr.Dataset:
     """Üy, λ and Δμ from tests on a shaking table, by profile likelihood with the exact solver.
 
-    The table's recorded motion shakes the model's block, and what it does is fitted to whatever was measured of the
-    real one, each channel weighted by its noise.  The noise of the table's own record enters the intervals.
+    The table's recorded motion shakes the model's block, and what it does is fitted to whatever was
+    measured of the real one, each channel weighted by its noise.  The noise of the table's own
+    record enters the intervals.
 
     Parameters
     ----------
     test : path, Dataset, mapping of str to DataArray, or ShakingTest, or a list of these
-        As for `measured_friction`, but of the block any one or more of `block_acceleration` (m/s²), `relative_velocity`
-        (m/s) and `relative_displacement` (m), downslope positive; NaN or a blank cell where there is no sample.
-        Several tests of one interface are calibrated together.
+        As for `measured_friction`, but of the block any one or more of `block_acceleration` (m/s²),
+        `relative_velocity` (m/s) and `relative_displacement` (m), downslope positive; NaN or a
+        blank cell where there is no sample. Several tests of one interface are calibrated together.
     theta, mu_s, phi : float
-        Inclination of the base, degrees, and static friction coefficient, or its angle, degrees: mu_s = tan phi.
+        Inclination of the base, degrees, and static friction coefficient, or its angle, degrees:
+        mu_s = tan phi.
     model : Mendez or str
         The rules of motion.
     offset, drift : str or list of str
-        Channels, `ground_acceleration` among them, whose sensor has an offset, or an offset and a drift in a straight
-        line; "all" for all.  They are fitted together with the parameters; the attribute `removed` has what was found.
+        Channels, `ground_acceleration` among them, whose sensor has an offset, or an offset and a
+        drift in a straight line; "all" for all.  They are fitted together with the parameters; the
+        attribute `removed` has what was found.
     noise : mapping of str to float, optional
         Standard deviation of the noise of channels; by default estimated from the residuals.
     cycles : bool
@@ -64,21 +70,25 @@ def calibrate(
     Returns
     -------
     Dataset
-        `yield_acceleration` (m/s²), `decay_rate` and `delta_mu`, each with ``_error`` (standard error; NaN where it is
-        not determined) and ``_interval`` (95 %, along `bound`; 0 and inf where the data set no bound), and their
-        `correlation`.  `static_friction` and `kinetic_friction` by statics with intervals.  Along `cycle`:
-        ``cycle_`` and the same names, `cycle_start` (s), `cycle_peak_acceleration` (m/s²), `cycle_sliding_mode` and
-        `cycle_attenuation_coefficient` (Kd, stick-slip).  Along `time`: ``measured_`` (less `removed`) and
-        ``computed_`` accelerations, velocity and displacement, the computed friction, and the measured
-        `friction_coefficient` (Eq. 1) and `free_body_friction`.  ``misfit_`` and a channel is the root mean square of
-        their difference.  Several tests have a dimension `test` more.  Attributes: `findings`, sentences on what the
-        tests do not determine and what would; `constant_friction`, as of `measured_friction`; `model_table` and
-        `uncertainty_table`, to paste into a sweep file, commented out if they are not ready for use.
+        `yield_acceleration` (m/s²), `decay_rate` and `delta_mu`, each with ``_error`` (standard
+        error; NaN where it is not determined) and ``_interval`` (95 %, along `bound`; 0 and inf
+        where the data set no bound), and their `correlation`.  `static_friction` and
+        `kinetic_friction` by statics with intervals.  Along `cycle`: ``cycle_`` and the same names,
+        `cycle_start` (s), `cycle_peak_acceleration` (m/s²), `cycle_sliding_mode` and
+        `cycle_attenuation_coefficient` (Kd, stick-slip).  Along `time`: ``measured_`` (less
+        `removed`) and ``computed_`` accelerations, velocity and displacement, the computed
+        friction, and the measured `friction_coefficient` (Eq. 1) and `free_body_friction`.
+        ``misfit_`` and a channel is the root mean square of their difference.  Several tests have a
+        dimension `test` more.  Attributes: `findings`, sentences on what the tests do not determine
+        and what would; `constant_friction`, as of `measured_friction`; `model_table` and
+        `uncertainty_table`, to paste into a sweep file, commented out if they are not ready for
+        use.
 
     Raises
     ------
     InputError
-        A test that cannot be read or measured nothing of the block, or a value that no physics allows.
+        A test that cannot be read or measured nothing of the block, or a value that no physics
+        allows.
 
     See Also
     --------
@@ -95,20 +105,31 @@ def calibrate(
     tests = [friction.test_of(one) for one in (test if isinstance(test, list | tuple) else [test])]
     if not tests:
         raise InputError("test = []: must be one test at least")
-    theta, mu_s = parameters.check_single("theta", theta), parameters.single_friction_coefficient(mu_s, phi)
+    theta = parameters.check_single("theta", theta)
+    mu_s = parameters.single_friction_coefficient(mu_s, phi)
     chosen = options.MODELS.of(model)
     if not isinstance(chosen, options.Mendez):
-        raise InputError(f"model = {chosen!r}: must be 'mendez': Newmark's block has no λ and no Δμ")
+        raise InputError(
+            f"model = {chosen!r}: must be 'mendez': Newmark's block has no λ and no Δμ"
+        )
     if noise is not None and not isinstance(noise, Mapping):
-        raise InputError(f"noise = {parameters.shown(noise)}: must be a mapping of channels to standard deviations")
+        raise InputError(
+            f"noise = {parameters.shown(noise)}: must be a mapping of channels to standard deviations"
+        )
     for name, value in (noise or {}).items():
         if not parameters.check_finite(f"noise.{name}", value) > 0.0:
-            raise InputError(f"noise.{name} = {parameters.shown(value)}: must be a finite number > 0")
+            raise InputError(
+                f"noise.{name} = {parameters.shown(value)}: must be a finite number > 0"
+            )
 
     def observed(*more: str) -> list[Observation]:
-        return [Observation(one, theta, mu_s, chosen, offset, drift, noise or {}, more) for one in tests]
+        return [
+            Observation(one, theta, mu_s, chosen, offset, drift, noise or {}, more) for one in tests
+        ]
 
-    with threadpool_limits(1, "blas"):  # its threads wait for each other: ten times as long on a busy machine
+    with threadpool_limits(
+        1, "blas"
+    ):  # its threads wait for each other: ten times as long on a busy machine
         observations = observed()
         found = estimate(observations)
         if "continuous" not in found.readings:
@@ -118,9 +139,15 @@ def calibrate(
                 found = estimate(observations)
         statics = [_statics(one) for one in observations]
         constant = next((one for one in statics if one.attrs["constant_friction"]), None)
-        misfit = [] if constant is not None else _misfit(found, lambda name: estimate(observed(name)))
+        misfit = (
+            [] if constant is not None else _misfit(found, lambda name: estimate(observed(name)))
+        )
         parts = [_of_test(one, found, cycles) for one in observations]
-        whole = parts[0] if len(parts) == 1 else xr.concat(parts, "test", join="outer", combine_attrs="override")
+        whole = (
+            parts[0]
+            if len(parts) == 1
+            else xr.concat(parts, "test", join="outer", combine_attrs="override")
+        )
         whole = whole.merge(_of_all(found)).assign(statics[0].variables)
     whole.attrs = {
         "title": "Calibration of a sliding block from tests on a shaking table",
@@ -135,7 +162,8 @@ def calibrate(
 
 def _of_test(one: Observation, found: Estimate, cycles: bool) -> xr.Dataset:
     """What belongs to one test: measured and computed series, misfits, cycles; the attribute `removed`."""
-    test, history = one.test, one.forward(found.parameters, one.test.times)
+    test = one.test
+    history = one.forward(found.parameters, one.test.times)
     added, removed = _removed(one, found.parameters)
     about = variables.CALIBRATION_SERIES | variables.MEASURED_FRICTION
     series = {f"measured_{name}": values - added[name] for name, values in test.channels.items()}
@@ -144,15 +172,25 @@ def _of_test(one: Observation, found: Estimate, cycles: bool) -> xr.Dataset:
     if block is not None:
         block = block - added.get("block_acceleration", 0.0)
         table = series[f"measured_{TABLE}"]
-        series["friction_coefficient"] = friction.eq1_friction(table, block, one.theta, one.mu_s, one.model.g)
+        series["friction_coefficient"] = friction.eq1_friction(
+            table, block, one.theta, one.mu_s, one.model.g
+        )
         series["free_body_friction"] = friction.free_body_friction(block, one.theta, one.model.g)
     data: dict[str, Any] = {name: ("time", values, about[name]) for name, values in series.items()}
     for name, misfit in zip(one.channels, one.misfits(found.parameters), strict=True):
         span = max(float(np.nanmax(np.abs(history[name]))), 1e-300)
-        long_name = f"root mean square of measured less computed {variables.HISTORY[name]['long_name']}"
+        long_name = (
+            f"root mean square of measured less computed {variables.HISTORY[name]['long_name']}"
+        )
         data[f"misfit_{name}"] = ((), misfit, {**variables.HISTORY[name], "long_name": long_name})
-        data[f"relative_misfit_{name}"] = ((), misfit / span, {"units": "1", "long_name": f"{long_name}, over largest"})
-    data |= {name: found.summary(one)[name].variable for name in ("permanent_displacement", "validity")}
+        data[f"relative_misfit_{name}"] = (
+            (),
+            misfit / span,
+            {"units": "1", "long_name": f"{long_name}, over largest"},
+        )
+    data |= {
+        name: found.summary(one)[name].variable for name in ("permanent_displacement", "validity")
+    }
     time = {"time": ("time", test.times, {"units": "s", "long_name": "time"})}
     dataset = xr.Dataset(data, time, {"removed": "; ".join(removed) or "nothing"})
     return dataset.merge(_cycles(one, found)) if cycles else dataset
@@ -165,52 +203,89 @@ def _removed(one: Observation, parameters: Floats) -> tuple[dict[str, Floats], l
     sizes = np.transpose(one.linear.nuisances(parameters))[one.motion.shapes.shape[1] :]
     for line, (size, error) in zip(one.lines, sizes, strict=True):
         added[line.channel] = added[line.channel] + size * line.values
-        units = variables.HISTORY[line.channel]["units"] + " over the whole test" * (line.name == "drift")
-        size, error = line.deviation * size, line.deviation * error
+        units = variables.HISTORY[line.channel]["units"] + " over the whole test" * (
+            line.name == "drift"
+        )
+        size = line.deviation * size
+        error = line.deviation * error
         texts.append(f"{line.name} of {line.channel}: {size:.4g} ± {error:.2g} {units}")
     return added, texts
 
 
 def _cycles(one: Observation, found: Estimate) -> xr.Dataset:
     """Each cycle by itself: estimates, standard errors and Kd."""
-    motion, times, continuous = one.motion, one.test.times, "continuous" in found.readings
+    motion = one.motion
+    times = one.test.times
+    continuous = "continuous" in found.readings
     least = max(found.parameters[0], _A_CYCLE * one.peak)
-    pulses = [part for part in runs_of(motion.acceleration > 0.0) if motion.acceleration[part].max() > least]
-    data = {name: np.full(len(pulses), np.nan) for name in variables.CALIBRATION if name.startswith("cycle_")}
+    pulses = [
+        part
+        for part in runs_of(motion.acceleration > 0.0)
+        if motion.acceleration[part].max() > least
+    ]
+    data = {
+        name: np.full(len(pulses), np.nan)
+        for name in variables.CALIBRATION
+        if name.startswith("cycle_")
+    }
     data["cycle_start"][:] = starts = [motion.times[part.start] for part in pulses]
     data["cycle_peak_acceleration"][:] = [motion.acceleration[part].max() for part in pulses]
-    speed = max(float(np.abs(one.forward(found.parameters, times)["relative_velocity"]).max()), 1e-6)
+    speed = max(
+        float(np.abs(one.forward(found.parameters, times)["relative_velocity"]).max()), 1e-6
+    )
     for row, (begin, end) in enumerate(zip(starts, [*starts[1:], motion.times[-1]], strict=True)):
         inside = (times >= begin) & (times < end)
         if inside.sum() < _FEWEST_IN_A_CYCLE:
             continue
-        values, errors = cycle_estimate(one.cycle(begin, end, speed), found, [1, 2] if continuous else [0, 1, 2])
+        values, errors = cycle_estimate(
+            one.cycle(begin, end, speed), found, [1, 2] if continuous else [0, 1, 2]
+        )
         for name, value, error in zip(SOUGHT, values, errors, strict=True):
-            data[f"cycle_{name}"][row], data[f"cycle_{name}_error"][row] = value, error
+            data[f"cycle_{name}"][row] = value
+            data[f"cycle_{name}_error"][row] = error
         history = one.forward(np.where(np.isfinite(values), values, found.parameters), times)
         slides = inside & (history[TABLE] > 0.0)
         if slides.any() and not continuous:
-            data["cycle_attenuation_coefficient"][row] = history["block_acceleration"][slides].max() / one.model.g
+            data["cycle_attenuation_coefficient"][row] = (
+                history["block_acceleration"][slides].max() / one.model.g
+            )
     mode = variables.SlidingMode.CONTINUOUS if continuous else variables.SlidingMode.STICK_SLIP
     data["cycle_sliding_mode"] = np.full(len(pulses), mode, np.int8)
-    number = {"cycle": ("cycle", np.arange(1, len(pulses) + 1), {"units": "1", "long_name": "number of the cycle"})}
-    columns = {name: ("cycle", values, variables.CALIBRATION[name]) for name, values in data.items()}
+    number = {
+        "cycle": (
+            "cycle",
+            np.arange(1, len(pulses) + 1),
+            {"units": "1", "long_name": "number of the cycle"},
+        )
+    }
+    columns = {
+        name: ("cycle", values, variables.CALIBRATION[name]) for name, values in data.items()
+    }
     return xr.Dataset(columns, number)
 
 
 def _of_all(found: Estimate) -> xr.Dataset:
     """What belongs to all tests together: parameters, errors, intervals, correlation."""
     pair = ("parameter", "other_parameter")
-    data: dict[str, Any] = {"correlation": (pair, found.correlation, variables.CALIBRATION["correlation"])}
-    for name, value, error, interval in zip(SOUGHT, found.parameters, found.errors, found.intervals, strict=True):
+    data: dict[str, Any] = {
+        "correlation": (pair, found.correlation, variables.CALIBRATION["correlation"])
+    }
+    for name, value, error, interval in zip(
+        SOUGHT, found.parameters, found.errors, found.intervals, strict=True
+    ):
         about = variables.PARAMETERS[name]
         data[name] = ((), value, about)
-        data[f"{name}_error"] = ((), error, {**about, "long_name": f"standard error of the {about['long_name']}"})
+        data[f"{name}_error"] = (
+            (),
+            error,
+            {**about, "long_name": f"standard error of the {about['long_name']}"},
+        )
         of_interval = {**about, "long_name": f"95 % interval of the {about['long_name']}"}
         data[f"{name}_interval"] = ("bound", interval, of_interval)
     codes = {"flag_values": [0, 1, 2], "flag_meanings": " ".join(SOUGHT)}
     coords: dict[str, Any] = {
-        name: (name, np.arange(3, dtype=np.int8), {"long_name": name.replace("_", " "), **codes}) for name in pair
+        name: (name, np.arange(3, dtype=np.int8), {"long_name": name.replace("_", " "), **codes})
+        for name in pair
     }
     coords["bound"] = friction.BOUND
     for name in ("theta", "mu_s"):
@@ -218,17 +293,21 @@ def _of_all(found: Estimate) -> xr.Dataset:
     return xr.Dataset(data, coords)
 
 
-def _report(found: Estimate, results: xr.Dataset, constant: xr.Dataset | None, misfit: Sequence[str]) -> dict[str, str]:
+def _report(
+    found: Estimate, results: xr.Dataset, constant: xr.Dataset | None, misfit: Sequence[str]
+) -> dict[str, str]:
     """All that must be said of a calibration, as attributes of its results.
 
-    `constant` are the coefficients of a test in which friction was constant, `misfit` sentences.  The tables for a
-    sweep file are commented out where the calibration has failed or determines too little.
+    `constant` are the coefficients of a test in which friction was constant, `misfit` sentences.
+    The tables for a sweep file are commented out where the calibration has failed or determines too
+    little.
     """
     sentence = "" if constant is None else constant.attrs["constant_friction"]
     slides = bool((results["permanent_displacement"] != 0.0).any())
     said = [sentence] if sentence else [*misfit]
     for one in found.observations:
-        first, most = float(one.motion.acceleration[0]), float(np.abs(one.motion.acceleration).max())
+        first = float(one.motion.acceleration[0])
+        most = float(np.abs(one.motion.acceleration).max())
         if abs(first) > max(_MOVES * most, 3.0 * one.motion.noise):
             said.append(
                 f"The table moves as the record begins, at {first:.3g} m/s2. The block is taken to be at rest there. "
@@ -241,13 +320,17 @@ def _report(found: Estimate, results: xr.Dataset, constant: xr.Dataset | None, m
             "slip: these samples are left out, and the displacement may step there."
         )
     if not slides:
-        said.append("The computed block does not slide: no parameter is determined. Test with a larger amplitude.")
+        said.append(
+            "The computed block does not slide: no parameter is determined. Test with a larger amplitude."
+        )
     elif not found.determined.all():
         said += _undetermined(found)
     contradictions = [text for one in found.observations for text in _contradiction(found, one)]
     said += contradictions
     if (results["validity"] & variables.Validity.NOT_RECOUPLED).any():
-        said.append("The computed block does not come to rest before the next slide begins (flag not_recoupled).")
+        said.append(
+            "The computed block does not come to rest before the next slide begins (flag not_recoupled)."
+        )
     if constant is not None:
         tables = _newmark_tables(found.observations[0], constant)
     elif found.determined.all() and slides and not misfit and not contradictions:
@@ -256,14 +339,22 @@ def _report(found: Estimate, results: xr.Dataset, constant: xr.Dataset | None, m
         comments = ["WARNING: not ready for use.", *said, "", *_model_table(found).splitlines()]
         tables = "".join(f"# {line}".rstrip() + "\n" for line in comments), ""
     texts = (sentence, "\n".join(said), *tables)
-    return dict(zip(("constant_friction", "findings", "model_table", "uncertainty_table"), texts, strict=True))
+    return dict(
+        zip(
+            ("constant_friction", "findings", "model_table", "uncertainty_table"),
+            texts,
+            strict=True,
+        )
+    )
 
 
 def _block_acceleration(test: ShakingTest) -> Floats | None:
     """The block's acceleration, measured or from the relative velocity; None without either."""
     if "block_acceleration" in test.channels or "relative_velocity" not in test.channels:
         return test.channels.get("block_acceleration")
-    return np.asarray(test.channels[TABLE] - np.gradient(test.channels["relative_velocity"], test.times))
+    return np.asarray(
+        test.channels[TABLE] - np.gradient(test.channels["relative_velocity"], test.times)
+    )
 
 
 def _statics(one: Observation) -> xr.Dataset:
@@ -272,7 +363,9 @@ def _statics(one: Observation) -> xr.Dataset:
     if block is None:
         return xr.Dataset(attrs={"constant_friction": ""})
     table = np.interp(one.test.times, one.motion.times, one.motion.acceleration)
-    slides = friction.slides_of(one.test.times, table, block, friction.threshold_of(table, block)[0])
+    slides = friction.slides_of(
+        one.test.times, table, block, friction.threshold_of(table, block)[0]
+    )
     return friction.coefficients_of(table, block, slides, one.mu_s, one.theta, one.model.g)
 
 
@@ -280,7 +373,9 @@ def _misfits(found: Estimate) -> dict[str, float]:
     """Channels whose misfit is more than 1.5 times their noise and 1 % of their largest value, and how many times."""
     worse: dict[str, float] = {}
     for one in found.observations:
-        of_channels = zip(one.channels, one.misfits(found.parameters), one.sensor_noise, one.largest, strict=True)
+        of_channels = zip(
+            one.channels, one.misfits(found.parameters), one.sensor_noise, one.largest, strict=True
+        )
         for name, misfit, noise, largest in of_channels:
             if misfit > max(1.5 * noise, 0.01 * largest):
                 worse[name] = max(misfit / noise, worse.get(name, 0.0))
@@ -297,7 +392,9 @@ def _misfit(found: Estimate, with_drift: Callable[[str], Estimate]) -> list[str]
         "sensor drifts: do not use the parameters before you know why (see the figure)."
     ]
     for name in RESPONSES:
-        may_drift = all(name in one.channels and name not in one.drifts for one in found.observations)
+        may_drift = all(
+            name in one.channels and name not in one.drifts for one in found.observations
+        )
         if may_drift and not _misfits(with_drift(name)):
             explained = "taken out, the misfit is that of the sensors' noise"
             said.append(f"With an offset and a drift of {name} {explained}: give drift = {name!r}.")
@@ -308,20 +405,29 @@ def _contradiction(found: Estimate, one: Observation) -> list[str]:
     """A lower bound of Üy that is larger than the accelerations at which the block was seen to begin to slide."""
     if "block_acceleration" not in one.channels or "continuous" in found.readings:
         return []
-    times, block = one.test.times, one.test.channels["block_acceleration"]
+    times = one.test.times
+    block = one.test.channels["block_acceleration"]
     table = np.interp(times, one.motion.times, one.motion.acceleration)
     threshold = friction.threshold_of(one.test.channels[TABLE], block)[0]
     slides = friction.slides_of(times, table, block, threshold)
-    onsets = np.array([friction.onset_acceleration(table, block, slide, threshold) for slide in slides])
+    onsets = np.array(
+        [friction.onset_acceleration(table, block, slide, threshold) for slide in slides]
+    )
     onsets = onsets[onsets > 0.0]  # downslope
     if not onsets.size:
         return []
-    step, least, seen = np.abs(np.diff(table)).max(), found.intervals[0][0], np.median(onsets)
+    step = np.abs(np.diff(table)).max()
+    least = found.intervals[0][0]
+    seen = np.median(onsets)
     text = (
         f"Üy is at least {least:.3g} m/s2 by the fit, but the block was seen to begin to slide at {seen:.3g} m/s2: the "
         "fit contradicts the test."
     )
-    return [text] if least > seen + step + threshold + 3.0 * np.std(onsets) / len(onsets) ** 0.5 else []
+    return (
+        [text]
+        if least > seen + step + threshold + 3.0 * np.std(onsets) / len(onsets) ** 0.5
+        else []
+    )
 
 
 def _undetermined(found: Estimate) -> list[str]:
@@ -334,15 +440,28 @@ def _undetermined(found: Estimate) -> list[str]:
     yields = "held" in found.readings and not math.isfinite(found.intervals[1][1])
     crosses = bool({"crossed", "crossing"} & found.readings)
     why = {
-        (True, True): "Two readings fit equally well: Üy holds the block, and λ and Δμ are nearly free; or Eq. 4 "
+        (
+            True,
+            True,
+        ): "Two readings fit equally well: Üy holds the block, and λ and Δμ are nearly free; or Eq. 4 "
         "crosses the table's acceleration at the same value, and Üy is anything below. The intervals are the union of "
         "both.",
-        (True, False): "Where Eq. 4 gives less than the yield acceleration in every cycle, the motion does not depend "
+        (
+            True,
+            False,
+        ): "Where Eq. 4 gives less than the yield acceleration in every cycle, the motion does not depend "
         "on λ and Δμ.",
-        (False, True): "Where Eq. 4 holds the block to the table until the table's acceleration has passed Üy, the "
+        (
+            False,
+            True,
+        ): "Where Eq. 4 holds the block to the table until the table's acceleration has passed Üy, the "
         "motion does not depend on Üy.",
     }.get((yields, crosses), "")
-    return [f"{listed} {are} not determined by {tests}: {ranges}.", *([why] if why else []), _remedy(found)]
+    return [
+        f"{listed} {are} not determined by {tests}: {ranges}.",
+        *([why] if why else []),
+        _remedy(found),
+    ]
 
 
 def _range(low: float, high: float) -> str:
@@ -360,10 +479,14 @@ def _remedy(found: Estimate) -> str:
     some = np.unique(np.linspace(0, len(found.allowed) - 1, 24).astype(int))
     ends = np.argsort(found.allowed, axis=0)[[0, -1]].ravel()
     columns = found.allowed[[*some, *ends]].T
-    cases = {name: xr.DataArray(column, dims="case") for name, column in zip(SOUGHT, columns, strict=True)}
+    cases = {
+        name: xr.DataArray(column, dims="case")
+        for name, column in zip(SOUGHT, columns, strict=True)
+    }
     moved = abs(found.summary(one, scale=factors, **cases)["permanent_displacement"])
     span = float(np.abs(found.summary(one)["permanent_displacement"]))
-    low, high = moved.min(dim="case").values, moved.max(dim="case").values
+    low = moved.min(dim="case").values
+    high = moved.max(dim="case").values
     if not np.isfinite(high).any():
         return f"{_ANOTHER}."
     best = int(np.nanargmax((high - low) / (np.sqrt(low * high) + 0.05 * span)))
@@ -376,10 +499,19 @@ def _remedy(found: Estimate) -> str:
 def _model_table(found: Estimate) -> str:
     """The [model] table of a sweep file, with intervals in comments."""
     model = found.observations[0].model
-    lines = ["[model]", 'friction = "mendez"', f'rise = "{model.rise}"', f'recoupling = "{model.recoupling}"']
+    lines = [
+        "[model]",
+        'friction = "mendez"',
+        f'rise = "{model.rise}"',
+        f'recoupling = "{model.recoupling}"',
+    ]
     for at, name in enumerate(SOUGHT):
         low, high = found.intervals[at]
-        about = f"95 %: {low:.4g} to {high:.4g}{_UNIT[at]}" if found.determined[at] else "not determined"
+        about = (
+            f"95 %: {low:.4g} to {high:.4g}{_UNIT[at]}"
+            if found.determined[at]
+            else "not determined"
+        )
         lines.append(f"{name} = {_number(found.parameters[at])}  # {about}")
     return "\n".join([*lines, f"g = {model.g:g}"]) + "\n"
 
@@ -389,10 +521,15 @@ def _uncertainty_table(found: Estimate) -> str:
     if not np.isfinite(found.errors).all():
         return ""
     lines = ["[uncertainty]"]
-    most = 0.9998  # a hair less than 1, so that with rounding a matrix of correlations stays positive
+    most = (
+        0.9998  # a hair less than 1, so that with rounding a matrix of correlations stays positive
+    )
     rounded = np.round(np.clip(found.correlation, -most, most), 4)
     if np.linalg.eigvalsh(rounded + np.diag([1.0 - most] * 3)).min() > 1e-6:
-        pairs = [f'["{SOUGHT[i]}", "{SOUGHT[j]}", {rounded[i, j]:.4f}]' for i, j in ((0, 1), (0, 2), (1, 2))]
+        pairs = [
+            f'["{SOUGHT[i]}", "{SOUGHT[j]}", {rounded[i, j]:.4f}]'
+            for i, j in ((0, 1), (0, 2), (1, 2))
+        ]
         lines.append(f"correlation = [{', '.join(pairs)}]")
     for name, value, error in zip(SOUGHT, found.parameters, found.errors, strict=True):
         lines += _normal(name, value, error)
@@ -410,7 +547,9 @@ def _newmark_tables(one: Observation, coefficients: xr.Dataset) -> tuple[str, st
     """Newmark's block with the kinetic coefficient, for a block of constant friction."""
     kinetic = coefficients["kinetic_friction"].item()
     low, high = coefficients["kinetic_friction_interval"].values
-    low, value, high = one.model.g * np.tan(np.arctan([low, kinetic, high]) - math.radians(one.theta))
+    low, value, high = one.model.g * np.tan(
+        np.arctan([low, kinetic, high]) - math.radians(one.theta)
+    )
     head = "# A block of constant friction: Newmark's model, with the kinetic coefficient"
     model = (
         f"{head} {kinetic:.4g} at {one.theta:g} deg.\n"
@@ -427,7 +566,9 @@ def sweep_file_text(model_table: str, uncertainty_table: str) -> str:
         return model_table
     drawn = tuple(f"{name} = " for name in SOUGHT if f"[uncertainty.{name}]" in uncertainty_table)
     lines = model_table.splitlines()
-    lines = [f"# {line}; without [uncertainty]" if line.startswith(drawn) else line for line in lines]
+    lines = [
+        f"# {line}; without [uncertainty]" if line.startswith(drawn) else line for line in lines
+    ]
     return "\n".join(lines) + "\n\n" + uncertainty_table
 
 

@@ -36,7 +36,9 @@ def naming_choices(function: Function) -> Function:
     def call(*arguments: Any, **options: Any) -> Any:
         for name, family in itertools.product(options, (WAVEFORMS, MODELS, SOLVERS)):
             if name not in known and name in family.options:
-                owner = next(one for one in family.choices if name in {f.name for f in declared(one)})
+                owner = next(
+                    one for one in family.choices if name in {f.name for f in declared(one)}
+                )
                 raise TypeError(
                     f"{function.__name__}() has no argument {name!r}: give "
                     f"{family.keyword}={owner.__name__}({name}={shown(options[name])})"
@@ -76,9 +78,10 @@ def sweep(
 ) -> xr.Dataset:
     """Response of a sliding block over a grid of parameters.
 
-    The model is that of Mendez, Romo and Botero [1]_, or Newmark's block.  A scalar becomes a scalar coordinate, a 1-D
-    array a dimension of the parameter's own name; the grid is the outer product of all of them.  A DataArray keeps its
-    dimensions, so that several on one shared dimension are combined value by value, not crossed.
+    The model is that of Mendez, Romo and Botero [1]_, or Newmark's block.  A scalar becomes a
+    scalar coordinate, a 1-D array a dimension of the parameter's own name; the grid is the outer
+    product of all of them.  A DataArray keeps its dimensions, so that several on one shared
+    dimension are combined value by value, not crossed.
 
     Parameters
     ----------
@@ -87,14 +90,15 @@ def sweep(
     mu_s : float, array or DataArray
         Static friction coefficient, > 0.
     amplitude : float, array or DataArray
-        Peak ground acceleration A, m/s², ≥ 0; a record, or every motion of a suite, is scaled to it.
+        Peak ground acceleration A, m/s², ≥ 0; a record, or every motion of a suite, is scaled to
+        it.
     frequency : float, array or DataArray
         Excitation frequency, Hz, > 0; not with a record.
     phi : float, array or DataArray, optional
         Friction angle, degrees, instead of `mu_s` = tan φ.
     excitation : Sine, Cosine, Triangle, Square, Harmonics, Record, Suite or str
-        Motion of the base; "sine", "cosine", "triangle" and "square" are ten cycles without ramps.  All that is written
-        about a record below holds for each motion of a suite.
+        Motion of the base; "sine", "cosine", "triangle" and "square" are ten cycles without ramps.
+        All that is written about a record below holds for each motion of a suite.
     model : Mendez, Newmark or str
         The paper's friction law, or the classical rigid block; "mendez", "newmark".
     solver : Cycle, Step or str
@@ -105,31 +109,35 @@ def sweep(
     scale : float, array or DataArray
         With a record: factor on its acceleration, > 0, instead of `amplitude`; by default 1.
     pgv, arias_intensity : float, array or DataArray
-        With a record, instead of `amplitude`: peak ground velocity or Arias intensity (m/s) that it is scaled to, after
-        `time_scale` has stretched it.
+        With a record, instead of `amplitude`: peak ground velocity or Arias intensity (m/s) that it
+        is scaled to, after `time_scale` has stretched it.
     time_scale : float, array or DataArray
         With a record: factor on its time, > 0; 2 makes it last twice as long.
     polarity : {1, -1}, list of these, or "both"
-        With a record: whether positive (1) or negative (-1) recorded acceleration drives the block downslope.
+        With a record: whether positive (1) or negative (-1) recorded acceleration drives the block
+        downslope.
     azimuth : float, array or DataArray
-        With a suite of pairs of components, of which it is needed: the direction of sliding, degrees from the first
-        component towards the second, 0 to 360.
+        With a suite of pairs of components, of which it is needed: the direction of sliding,
+        degrees from the first component towards the second, 0 to 360.
     yield_acceleration : float, array or DataArray, optional
         Üy, m/s²; by default Coulomb's, g tan(φs − θ).
     yield_coefficient : float, array or DataArray, optional
         ky = Üy/g of Newmark's block, instead of `theta`, `mu_s` and `yield_acceleration`.
     decay_rate, delta_mu, minimum_friction : float, array or DataArray, optional
-        λ, Δμ and μmin where they are known; each replaces its estimate (Eqs. 6, 9-11), which under a record every pulse
-        has from its own peak.
+        λ, Δμ and μmin where they are known; each replaces its estimate (Eqs. 6, 9-11), which under
+        a record every pulse has from its own peak.
     structure_frequency : float, array or DataArray, optional
-        Natural frequency of the sliding structure, Hz, for the `flexible_block` flag; not with a record.
+        Natural frequency of the sliding structure, Hz, for the `flexible_block` flag; not with a
+        record.
     variables : sequence of str, optional
-        Results to compute: `permanent_displacement`, `peak_relative_velocity`, `sliding_mode`, `validity` (these by
-        default), `newmark_displacement` (of Newmark's block on the same cells, with the same yield acceleration), the
-        parameters of Eqs. 7-11, and `amplitude`.  Under a record `sliding_mode` gives way to `number_of_slips` (that
-        begin at rest), `stick_slip_pulses` and `continuous_pulses` (by Eq. 7 with each pulse's own peak: an extension
-        of the paper's harmonic motion), the parameters and `amplitude` to `motion_factor`, by which the recorded
-        acceleration is multiplied (under a suite by default, too).
+        Results to compute: `permanent_displacement`, `peak_relative_velocity`, `sliding_mode`,
+        `validity` (these by default), `newmark_displacement` (of Newmark's block on the same cells,
+        with the same yield acceleration), the parameters of Eqs. 7-11, and `amplitude`.  Under a
+        record `sliding_mode` gives way to `number_of_slips` (that begin at rest),
+        `stick_slip_pulses` and `continuous_pulses` (by Eq. 7 with each pulse's own peak: an
+        extension of the paper's harmonic motion), the parameters and `amplitude` to
+        `motion_factor`, by which the recorded acceleration is multiplied (under a suite by default,
+        too).
     chunks : int, tuple, dict or "auto", optional
         Chunks as dask takes them; the result is then lazy.  Do not divide the frequency.
     progress : callable, optional
@@ -138,16 +146,17 @@ def sweep(
     Returns
     -------
     Dataset
-        Dimensions theta, mu_s, amplitude, frequency, then others, `motion` last.  The parameters of Eqs. 7-11 do not
-        vary with frequency and have no such dimension.  A suite has its labels as `motion`, and the file and the
-        intensity measures of each motion, as it was recorded, as coordinates along it (``motion_pga`` and others:
-        `slipsweep.motion.intensity`).
+        Dimensions theta, mu_s, amplitude, frequency, then others, `motion` last.  The parameters of
+        Eqs. 7-11 do not vary with frequency and have no such dimension.  A suite has its labels as
+        `motion`, and the file and the intensity measures of each motion, as it was recorded, as
+        coordinates along it (``motion_pga`` and others: `slipsweep.motion.intensity`).
 
     Raises
     ------
     InputError
-        A physically impossible value, an unknown option, a grid that memory cannot hold.  A result that double
-        precision does not hold (of inputs near their bounds) is refused when it is computed: with `chunks`, later.
+        A physically impossible value, an unknown option, a grid that memory cannot hold.  A result
+        that double precision does not hold (of inputs near their bounds) is refused when it is
+        computed: with `chunks`, later.
 
     See Also
     --------
@@ -173,13 +182,28 @@ def sweep(
            [0.   , 0.081, 0.445]])
     """
     inputs = Inputs(
-        theta=theta, mu_s=mu_s, phi=phi, amplitude=amplitude, frequency=frequency,
-        displacement_amplitude=displacement_amplitude, scale=scale, pgv=pgv, arias_intensity=arias_intensity,
-        time_scale=time_scale, polarity=polarity, azimuth=azimuth, yield_acceleration=yield_acceleration,
-        yield_coefficient=yield_coefficient, decay_rate=decay_rate, delta_mu=delta_mu,
-        minimum_friction=minimum_friction, structure_frequency=structure_frequency,
-    )  # fmt: skip
-    plan = plan_sweep(inputs, excitation=excitation, model=model, solver=solver, variables=variables)
+        theta=theta,
+        mu_s=mu_s,
+        phi=phi,
+        amplitude=amplitude,
+        frequency=frequency,
+        displacement_amplitude=displacement_amplitude,
+        scale=scale,
+        pgv=pgv,
+        arias_intensity=arias_intensity,
+        time_scale=time_scale,
+        polarity=polarity,
+        azimuth=azimuth,
+        yield_acceleration=yield_acceleration,
+        yield_coefficient=yield_coefficient,
+        decay_rate=decay_rate,
+        delta_mu=delta_mu,
+        minimum_friction=minimum_friction,
+        structure_frequency=structure_frequency,
+    )
+    plan = plan_sweep(
+        inputs, excitation=excitation, model=model, solver=solver, variables=variables
+    )
     found = plan.solve(progress) if chunks is None else _lazy(plan, chunks)
     return found.assign_coords(brought_coordinates(inputs, plan.coords, plan.names))
 
@@ -201,17 +225,17 @@ def friction_parameters(
     Parameters
     ----------
     theta, mu_s, amplitude, phi, model
-        Inclination (degrees), static friction coefficient, peak ground acceleration (m/s²), friction angle (degrees)
-        and friction law, as in `sweep`.
+        Inclination (degrees), static friction coefficient, peak ground acceleration (m/s²),
+        friction angle (degrees) and friction law, as in `sweep`.
     yield_acceleration, decay_rate, delta_mu, minimum_friction : float, array or DataArray, optional
         Those that are known, as in `sweep`; each replaces its estimate.
 
     Returns
     -------
     Dataset
-        `yield_acceleration`, `limiting_acceleration` (m/s²), `acceleration_ratio`, `minimum_friction`, `delta_mu`,
-        `decay_rate`, `sliding_mode`, and the part of `validity` that is known before the motion.  A parameter that was
-        given is a coordinate.
+        `yield_acceleration`, `limiting_acceleration` (m/s²), `acceleration_ratio`,
+        `minimum_friction`, `delta_mu`, `decay_rate`, `sliding_mode`, and the part of `validity`
+        that is known before the motion.  A parameter that was given is a coordinate.
 
     Raises
     ------
@@ -235,9 +259,15 @@ def friction_parameters(
     'STICK_SLIP'
     """
     inputs = Inputs(
-        theta=theta, mu_s=mu_s, phi=phi, amplitude=amplitude, yield_acceleration=yield_acceleration,
-        decay_rate=decay_rate, delta_mu=delta_mu, minimum_friction=minimum_friction,
-    )  # fmt: skip
+        theta=theta,
+        mu_s=mu_s,
+        phi=phi,
+        amplitude=amplitude,
+        yield_acceleration=yield_acceleration,
+        decay_rate=decay_rate,
+        delta_mu=delta_mu,
+        minimum_friction=minimum_friction,
+    )
     plan = plan_friction_parameters(inputs, model=model)
     return plan.solve().assign_coords(brought_coordinates(inputs, plan.coords, plan.names))
 
@@ -252,7 +282,9 @@ def brought_coordinates(
         if not isinstance(array, xr.DataArray):
             continue
         # levels of stacked coordinates come along; their tuples, which no file can hold, do not
-        stacked = [dim for dim in array.dims if isinstance(array.xindexes.get(dim), PandasMultiIndex)]
+        stacked = [
+            dim for dim in array.dims if isinstance(array.xindexes.get(dim), PandasMultiIndex)
+        ]
         for name, coordinate in array.reset_index(stacked).coords.items():
             variable = coordinate.variable.to_base_variable()
             known = brought.get(name)
@@ -260,11 +292,17 @@ def brought_coordinates(
             if name in array.dims and name in coords and name != parameter:
                 known = coords[str(name)]
             if known is not None and not known.equals(variable):
-                raise InputError(f"{parameter}: its coordinate {name!r} differs from that of another parameter")
+                raise InputError(
+                    f"{parameter}: its coordinate {name!r} differs from that of another parameter"
+                )
             if name in results:
-                raise InputError(f"{parameter}: its coordinate {name!r} has the name of a result: must have another")
+                raise InputError(
+                    f"{parameter}: its coordinate {name!r} has the name of a result: must have another"
+                )
             if name in dims and name not in coords and name not in variable.dims:
-                raise InputError(f"{parameter}: its coordinate {name!r} has the name of a dimension: must have another")
+                raise InputError(
+                    f"{parameter}: its coordinate {name!r} has the name of a dimension: must have another"
+                )
             brought[name] = variable
     return {name: variable for name, variable in brought.items() if name not in coords}
 
@@ -273,17 +311,24 @@ def _lazy(plan: Plan, chunks: Any) -> xr.Dataset:
     """The results as dask arrays; "auto" leaves frequency, which costs next to nothing, whole."""
     from dask.array.core import normalize_chunks
 
-    dims, wanted = ", ".join(plan.sizes), chunks
+    dims = ", ".join(plan.sizes)
+    wanted = chunks
     if isinstance(chunks, str) and chunks == "auto":
         wanted = dict.fromkeys(plan.sizes, "auto") | {"frequency": -1}
     if isinstance(wanted, Mapping):
         for dim in {*wanted} - {*plan.sizes, "frequency"}:
-            raise InputError(f"chunks = {shown(chunks)}: {dim!r} is not a dimension; they are {dims}")
+            raise InputError(
+                f"chunks = {shown(chunks)}: {dim!r} is not a dimension; they are {dims}"
+            )
         wanted = tuple(wanted.get(dim, -1) for dim in plan.sizes)
     try:
         lengths = normalize_chunks(wanted, tuple(plan.sizes.values()), dtype=np.dtype("f8"))
-        if (isinstance(chunks, int) and chunks == 0) or any(one <= 0 for own in lengths for one in own):
+        if (isinstance(chunks, int) and chunks == 0) or any(
+            one <= 0 for own in lengths for one in own
+        ):
             raise ValueError
     except (TypeError, ValueError, ArithmeticError, AttributeError, LookupError):
-        raise InputError(f"chunks = {shown(chunks)}: must be whole numbers > 0 along {dims}") from None
+        raise InputError(
+            f"chunks = {shown(chunks)}: must be whole numbers > 0 along {dims}"
+        ) from None
     return plan.lazy(dict(zip(plan.sizes, lengths, strict=True)))

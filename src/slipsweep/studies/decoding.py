@@ -19,15 +19,15 @@ def flags(data: xr.Dataset | xr.DataArray) -> xr.Dataset:
     Parameters
     ----------
     data : Dataset or DataArray
-        A result of `sweep`, `friction_parameters` or `simulate`, or a file of it opened with xarray, of which
-        `validity` is taken; or a bit mask itself.
+        A result of `sweep`, `friction_parameters` or `simulate`, or a file of it opened with
+        xarray, of which `validity` is taken; or a bit mask itself.
 
     Returns
     -------
     Dataset
-        `statically_unstable`, `uplift`, …: True where the flag is set; dimensions and coordinates of the bit mask.
-        First the flags under which there is no value, then cautions, then notes: the attribute `kind` says which,
-        `long_name` what the flag means.
+        `statically_unstable`, `uplift`, …: True where the flag is set; dimensions and coordinates
+        of the bit mask. First the flags under which there is no value, then cautions, then notes:
+        the attribute `kind` says which, `long_name` what the flag means.
 
     Raises
     ------
@@ -53,15 +53,21 @@ def flags(data: xr.Dataset | xr.DataArray) -> xr.Dataset:
     if not isinstance(data, xr.DataArray):
         raise InputError(f"data = {shown(data)}: must be a Dataset or a DataArray")
     mask = data.variable
-    names, bits = str(mask.attrs.get("flag_meanings", "")).split(), np.atleast_1d(mask.attrs.get("flag_masks", ()))
+    names = str(mask.attrs.get("flag_meanings", "")).split()
+    bits = np.atleast_1d(mask.attrs.get("flag_masks", ()))
     if not names or len(names) != len(bits):
         raise InputError(
             f"{data.name}: no bit mask, {len(bits)} flag_masks and {len(names)} flag_meanings in its attributes"
         )
     if mask.dtype.kind not in "iu":
-        raise InputError(f"{data.name}: {mask.dtype} values; must be whole numbers (mask_and_scale=False keeps them)")
+        raise InputError(
+            f"{data.name}: {mask.dtype} values; must be whole numbers (mask_and_scale=False keeps them)"
+        )
     # a flag of no kind, of another program's file, goes last
-    order = {name: list(FlagKind).index(_KNOWN[name].kind) if name in _KNOWN else len(FlagKind) for name in names}
+    order = {
+        name: list(FlagKind).index(_KNOWN[name].kind) if name in _KNOWN else len(FlagKind)
+        for name in names
+    }
     found = {}
     for name, bit in sorted(zip(names, bits, strict=True), key=lambda one: order[one[0]]):
         # the bit in the type of the mask: a wider one would widen all cells with it

@@ -1,8 +1,8 @@
 """Üy, λ and Δμ from one or several tests: the best, and all that the data allow.
 
-Where the yield acceleration governs, λ and Δμ may be nearly anything; where Eq. 4 crosses the table's acceleration,
-Üy may.  A standard error describes neither, so an interval is the profile likelihood's, the union over these branches,
-each compared with its own least (docs/calibration.md).
+Where the yield acceleration governs, λ and Δμ may be nearly anything; where Eq. 4 crosses the
+table's acceleration, Üy may.  A standard error describes neither, so an interval is the profile
+likelihood's, the union over these branches, each compared with its own least (docs/calibration.md).
 """
 
 import functools
@@ -22,19 +22,25 @@ from slipsweep.studies.likelihood import SOUGHT, Linear, Observation, runs_of
 #: What decides the block's acceleration, of each test.
 Readings = tuple[str, ...]
 
-#: Rise of the sum of squares at the ends of a 95 % interval, and of the least of a branch by which it is refuted.
-SQUARE, REFUTED = 3.841, 9.0
+#: Rise of the sum of squares at the ends of a 95 % interval, and of the least of a branch by which
+#: it is refuted.
+SQUARE = 3.841
+REFUTED = 9.0
 
 #: Bounds of the search: Üy over the table's peak A, λA/g, ln(1 + Δμ/μs).
-LEAST, MOST = np.array([1e-4, 0.0, 0.0]), np.array([1.0, 20.0, 3.0])
+LEAST = np.array([1e-4, 0.0, 0.0])
+MOST = np.array([1.0, 20.0, 3.0])
 
 #: Where the search begins.
 _ONSETS = (0.03, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 _DECAYS = (0.25, 0.5, 1.0, 2.0, 4.0)
 _EXCESS = (0.02, 0.1, 0.25)
 
-#: Starts that are followed roughly, and to the end; rounds at most in which motion, noise and samples at jumps settle.
-_ROUGH, _FINE, _ROUNDS = 8, 4, 5
+#: Starts that are followed roughly, and to the end; rounds at most in which motion, noise and
+#: samples at jumps settle.
+_ROUGH = 8
+_FINE = 4
+_ROUNDS = 5
 
 
 class Scale:
@@ -42,29 +48,39 @@ class Scale:
 
     def __init__(self, observations: Sequence[Observation]) -> None:
         self.peak = max(one.peak for one in observations)
-        self.mu_s, self.g = observations[0].mu_s, observations[0].model.g
+        self.mu_s = observations[0].mu_s
+        self.g = observations[0].model.g
         self.tan_theta = math.tan(math.radians(observations[0].theta))
 
     def parameters(self, point: Floats) -> Floats:
-        return np.array([point[0] * self.peak, point[1] * self.g / self.peak, self.mu_s * math.expm1(point[2])])
+        return np.array(
+            [point[0] * self.peak, point[1] * self.g / self.peak, self.mu_s * math.expm1(point[2])]
+        )
 
     def reading(self, point: Floats, peak: float) -> str:
         """What decides the block's acceleration in a test with this peak of the table's.
 
-        "continuous": Eq. 4 throughout.  "all": first Üy, later Eq. 4.  "crossing": Eq. 4, from where it crosses the
-        table's acceleration on; Üy plays no part.  One value throughout: "held", Üy; "crossed", that at the crossing.
+        "continuous": Eq. 4 throughout.  "all": first Üy, later Eq. 4.  "crossing": Eq. 4, from
+        where it crosses the table's acceleration on; Üy plays no part.  One value throughout:
+        "held", Üy; "crossed", that at the crossing.
         """
         onset, decay, excess = point
         table = np.linspace(0.0, 1.0, 65)[1:] * peak
-        coupled = self.mu_s - self.tan_theta - self.mu_s * np.exp(excess - decay * table / self.peak)
+        coupled = (
+            self.mu_s - self.tan_theta - self.mu_s * np.exp(excess - decay * table / self.peak)
+        )
         response = table - (self.g + table * self.tan_theta) * coupled - self.g * self.tan_theta
-        if peak > (onset * self.peak + self.g * self.mu_s) / (1.0 - self.tan_theta * (self.mu_s - self.tan_theta)):
+        if peak > (onset * self.peak + self.g * self.mu_s) / (
+            1.0 - self.tan_theta * (self.mu_s - self.tan_theta)
+        ):
             return "continuous"
         above = table > onset * self.peak
         slides = above & (response < table)
         first = int(np.argmax(slides))
         crosses = bool(above[:first].any()) or not slides.any()
-        if not slides.any() or float(response[first:].max()) <= max(onset * self.peak, float(response[first])):
+        if not slides.any() or float(response[first:].max()) <= max(
+            onset * self.peak, float(response[first])
+        ):
             return "crossed" if crosses else "held"
         return "crossing" if crosses else "all"
 
@@ -72,7 +88,10 @@ class Scale:
         """ln(1 + Δμ/μs) with which Eq. 4 gives the block's acceleration for one of the table, in parts of the peak."""
         normal = self.g + table * self.peak * self.tan_theta
         behind = (table - block) * self.peak - self.g * self.tan_theta
-        return math.log(max(self.mu_s - self.tan_theta - behind / normal, 1e-3) / self.mu_s) + decay * table
+        return (
+            math.log(max(self.mu_s - self.tan_theta - behind / normal, 1e-3) / self.mu_s)
+            + decay * table
+        )
 
 
 class Tried(NamedTuple):
@@ -90,13 +109,17 @@ class Tried(NamedTuple):
 class Search:
     """Independent residuals and readings (`Scale.reading`) of points, and all points that were tried."""
 
-    def __init__(self, residuals: Callable[[Floats], Floats], readings: Callable[[Floats], Readings]) -> None:
-        self._residuals, self._readings = residuals, readings
+    def __init__(
+        self, residuals: Callable[[Floats], Floats], readings: Callable[[Floats], Readings]
+    ) -> None:
+        self._residuals = residuals
+        self._readings = readings
         self.tried: list[Tried] = []
         self._least: dict[Readings, float] = {}
 
     def residuals(self, point: Floats) -> Floats:
-        rest, readings = self._residuals(point), self._readings(point)
+        rest = self._residuals(point)
+        readings = self._readings(point)
         branch = tuple("held" if one == "crossed" else one for one in readings)
         self.tried.append(Tried(np.array(point), readings, branch, float(rest @ rest)))
         self._least[branch] = min(self.tried[-1].square, self._least.get(branch, math.inf))
@@ -130,21 +153,32 @@ class Search:
             found.setdefault(self.tried[number].readings, self.tried[number].point)
         return list(found.values())
 
-    def polish(self, start: Floats, free: Sequence[int] = (0, 1, 2), most: int = 12, loss: str = "linear") -> Floats:
+    def polish(
+        self, start: Floats, free: Sequence[int] = (0, 1, 2), most: int = 12, loss: str = "linear"
+    ) -> Floats:
         """Least squares over some parameters, from a start; the point found."""
         free = list(free)
-        low, high = LEAST[free], MOST[free]
+        low = LEAST[free]
+        high = MOST[free]
         found = least_squares(
-            lambda part: self.residuals(_with(start, free, part)), np.clip(start[free], low + 1e-9, high - 1e-9),
-            bounds=(low, high), diff_step=1e-6, max_nfev=most, loss=loss, f_scale=3.0, ftol=1e-6, xtol=1e-7,
-        )  # fmt: skip
+            lambda part: self.residuals(_with(start, free, part)),
+            np.clip(start[free], low + 1e-9, high - 1e-9),
+            bounds=(low, high),
+            diff_step=1e-6,
+            max_nfev=most,
+            loss=loss,
+            f_scale=3.0,
+            ftol=1e-6,
+            xtol=1e-7,
+        )
         return _with(start, free, found.x)
 
     def slopes(self, point: Floats) -> Floats:
         """Derivatives of the residuals by the parameters, a column each."""
         columns = []
         for at, step in enumerate(1e-5 * np.eye(point.size)):
-            low, high = np.clip(point - step, LEAST, MOST), np.clip(point + step, LEAST, MOST)
+            low = np.clip(point - step, LEAST, MOST)
+            high = np.clip(point + step, LEAST, MOST)
             columns.append((self.residuals(high) - self.residuals(low)) / (high - low)[at])
         return np.column_stack(columns)
 
@@ -152,7 +186,9 @@ class Search:
         """95 % intervals, (parameters, 2), from first guesses of half their widths; a bound where the data set none."""
         for _ in range(3):
             least = self.least
-            found = np.array([[self.end(at, side, float(widths[at])) for side in (-1, 1)] for at in range(3)])
+            found = np.array(
+                [[self.end(at, side, float(widths[at])) for side in (-1, 1)] for at in range(3)]
+            )
             if self.least > least - 0.02:
                 break
             self.polish(self.best)
@@ -169,11 +205,15 @@ class Search:
         for one in self.allowed():
             if side * one.point[at] > side * outermost.setdefault(one.readings, one.point)[at]:
                 outermost[one.readings] = one.point
-        return max((self._followed(at, side, width, point) for point in outermost.values()), key=lambda end: side * end)
+        return max(
+            (self._followed(at, side, width, point) for point in outermost.values()),
+            key=lambda end: side * end,
+        )
 
     def _followed(self, at: int, side: int, width: float, start: Floats) -> float:
         """The end of a profile, from a point that the data allow."""
-        slopes, others = self.slopes(start), [one for one in range(start.size) if one != at]
+        slopes = self.slopes(start)
+        others = [one for one in range(start.size) if one != at]
         direction = np.eye(start.size)[at]
         direction[others] = -np.linalg.lstsq(slopes[:, others], slopes[:, at], rcond=1e-8)[0]
         path = {float(start[at]): start}
@@ -188,22 +228,31 @@ class Search:
                 path[value] = point
             return math.sqrt(min(max(above, 0.0), 30.0)) - math.sqrt(SQUARE)
 
-        limit, inside, step = float((LEAST, MOST)[side > 0][at]), float(start[at]), width
+        limit = float((LEAST, MOST)[side > 0][at])
+        inside = float(start[at])
+        step = width
         if inside == limit:
             return limit
         while beyond(value := side * min(side * (inside + side * step), side * limit)) <= 0.0:
             if value == limit:
                 return limit
-            inside, step = value, 2.0 * step
+            inside = value
+            step = 2.0 * step
         if inside == start[at] and beyond(inside) >= 0.0:
             return inside
-        return float(brentq(beyond, inside, value, xtol=max(0.01 * abs(value - start[at]), 1e-9), rtol=1e-6))
+        return float(
+            brentq(beyond, inside, value, xtol=max(0.01 * abs(value - start[at]), 1e-9), rtol=1e-6)
+        )
 
     def _profiled(self, at: int, value: float, near: Floats, along: Floats) -> tuple[Floats, float]:
         """The least rise of the sum of squares with one parameter held, and where: `along` leads from a point near."""
         change = value - near[at]
         # and with the same friction at three accelerations of the table, in parts of its peak
-        kept = [[0.0, 1.0, table] if at == 1 else [0.0, 1.0 / table, 1.0] for table in (0.3, 0.6, 1.0) if at > 0]
+        kept = [
+            [0.0, 1.0, table] if at == 1 else [0.0, 1.0 / table, 1.0]
+            for table in (0.3, 0.6, 1.0)
+            if at > 0
+        ]
         starts = [near, near + change * along, *(near + change * np.array(one) for one in kept)]
         first = len(self.tried)
         for start in starts:
@@ -220,9 +269,10 @@ class Search:
 class Estimate(NamedTuple):
     """What one or several tests say of Üy, λ and Δμ.
 
-    `intervals`, (3, 2), are at 95 %, 0 and inf where the data set no bound, and `determined` the parameters that these
-    bound well enough.  `errors` and `correlation`, of the linear fit, are NaN of the others.  `allowed` are parameters
-    tried that the data allow, one set a row, `readings` what decides the acceleration for these (`Scale.reading`).
+    `intervals`, (3, 2), are at 95 %, 0 and inf where the data set no bound, and `determined` the
+    parameters that these bound well enough.  `errors` and `correlation`, of the linear fit, are NaN
+    of the others.  `allowed` are parameters tried that the data allow, one set a row, `readings`
+    what decides the acceleration for these (`Scale.reading`).
     """
 
     parameters: Floats
@@ -252,15 +302,18 @@ def estimate(observations: Sequence[Observation]) -> Estimate:
             _try_branches(search, scale)
         elif search.square(starts[0]) - search.least < 0.1:
             break
-        starts, best = search.leaders(), scale.parameters(search.best)
+        starts = search.leaders()
+        best = scale.parameters(search.best)
         for one in observations:
             one.settle(best)
     width = 1.96 * np.sqrt(np.diag(_covariance(search.slopes(search.best))))
     intervals = search.intervals(np.where(np.isfinite(width), np.clip(width, 1e-5, 0.3), 0.1))
     intervals[0] = _beyond_mode_limit(intervals[0], observations, scale)
     low, high = map(scale.parameters, intervals.T)
-    low, high = np.where(intervals[:, 0] == LEAST, 0.0, low), np.where(intervals[:, 1] == MOST, np.inf, high)
-    allowed, best = search.allowed(), scale.parameters(search.best)
+    low = np.where(intervals[:, 0] == LEAST, 0.0, low)
+    high = np.where(intervals[:, 1] == MOST, np.inf, high)
+    allowed = search.allowed()
+    best = scale.parameters(search.best)
     # half an interval is no more than half of the value, of Δμ 0.3 of μs + Δμ
     widest = 2.0 * np.array([0.5, 0.5, 0.3]) * np.abs(best + np.array([0.0, 0.0, scale.mu_s]))
     determined = np.isfinite(high) & (high - low <= widest) & [low[0] > 0.0, True, True]
@@ -279,7 +332,9 @@ def estimate(observations: Sequence[Observation]) -> Estimate:
     )
 
 
-def _search(scale: Scale, observations: Sequence[Observation], near: Floats, rough: bool = False) -> Search:
+def _search(
+    scale: Scale, observations: Sequence[Observation], near: Floats, rough: bool = False
+) -> Search:
     """A search by the likelihoods near a point."""
     for one in observations:
         one.linearize(scale.parameters(near), rough)
@@ -291,7 +346,12 @@ def _search(scale: Scale, observations: Sequence[Observation], near: Floats, rou
 
 def _rough(observations: Sequence[Observation], scale: Scale) -> list[Floats]:
     """Starts, the best first, by fits in which no sample counts for much."""
-    starts = [np.array([onset, decay, excess]) for onset in _ONSETS for decay in _DECAYS for excess in _EXCESS]
+    starts = [
+        np.array([onset, decay, excess])
+        for onset in _ONSETS
+        for decay in _DECAYS
+        for excess in _EXCESS
+    ]
     for onset in _ONSETS:  # Eq. 4 crosses there
         for decay in _DECAYS:
             excess = scale.excess(onset, onset, decay)
@@ -311,8 +371,14 @@ def _try_branches(search: Search, scale: Scale) -> None:
     starts = [np.array([onset, MOST[1], 0.0]) for onset in (search.best[0], 0.7)]
     held = min((search.polish(start, free=(0,)) for start in starts), key=search.square)[0]
     for decay in _DECAYS:
-        top, crossing = scale.excess(1.0, min(1.05 * held, 0.99), decay), scale.excess(held, held, decay)
-        for onset, excess in ((held, top), (0.5 * held, top), (0.3 * held, crossing), (0.9 * held, crossing)):
+        top = scale.excess(1.0, min(1.05 * held, 0.99), decay)
+        crossing = scale.excess(held, held, decay)
+        for onset, excess in (
+            (held, top),
+            (0.5 * held, top),
+            (0.3 * held, crossing),
+            (0.9 * held, crossing),
+        ):
             search.square(np.clip([onset, decay, excess], LEAST, MOST))
     for start in search.leaders():
         search.polish(start)
@@ -320,14 +386,18 @@ def _try_branches(search: Search, scale: Scale) -> None:
 
 def _beyond_mode_limit(ends: Floats, observations: Sequence[Observation], scale: Scale) -> Floats:
     """Ends of Üy's interval; where one lies at the mode limit (Eq. 7) of a pulse, the error of its peak moves it."""
-    found, slope = ends, 1.0 - scale.tan_theta * (scale.mu_s - scale.tan_theta)
+    found = ends
+    slope = 1.0 - scale.tan_theta * (scale.mu_s - scale.tan_theta)
     for one in observations:
-        motion, spread = one.record().acceleration, np.sqrt(np.sum(one.motion.shapes**2, axis=1))
+        motion = one.record().acceleration
+        spread = np.sqrt(np.sum(one.motion.shapes**2, axis=1))
         for part in runs_of(motion > 0.0):
             top = part.start + int(np.argmax(motion[part]))
             limit = (slope * motion[top] - scale.g * scale.mu_s) / scale.peak
             error = 1.96 * slope * spread[top] / scale.peak
-            beyond = np.clip([min(found[0], limit - error), max(found[1], limit + error)], LEAST[0], MOST[0])
+            beyond = np.clip(
+                [min(found[0], limit - error), max(found[1], limit + error)], LEAST[0], MOST[0]
+            )
             found = np.where(np.abs(ends - limit) < error, beyond, found)
     return found
 
@@ -339,8 +409,16 @@ def cycle_estimate(linear: Linear, found: Estimate, free: list[int]) -> tuple[Fl
     def residuals(part: Floats) -> Floats:
         return linear(_with(found.parameters, free, part))
 
-    fit = least_squares(residuals, start, bounds=(-1e-9, 10.0 * start + 1.0), x_scale="jac", diff_step=1e-4, max_nfev=6)
-    none, covariance = np.full(3, np.nan), _covariance(fit.jac)
+    fit = least_squares(
+        residuals,
+        start,
+        bounds=(-1e-9, 10.0 * start + 1.0),
+        x_scale="jac",
+        diff_step=1e-4,
+        max_nfev=6,
+    )
+    none = np.full(3, np.nan)
+    covariance = _covariance(fit.jac)
     if not np.isfinite(covariance).all():
         return none, none
     return _with(none, free, fit.x), _with(none, free, np.sqrt(np.diag(covariance)))

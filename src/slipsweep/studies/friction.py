@@ -1,9 +1,9 @@
 """The friction that a test measured: Eq. 1 and statics on recorded accelerations, and the slides in them.
 
-The block slides where its acceleration is not the table's.  A slide is looked for in the relative acceleration
-r = Üg − Ü: it begins where |r| exceeds a threshold at two consecutive samples, and goes on until the relative velocity,
-the integral of r from there on, comes back to zero or r stays below the threshold.  The threshold stands above
-the noise of r, which is estimated from r itself.
+The block slides where its acceleration is not the table's.  A slide is looked for in the relative
+acceleration r = Üg − Ü: it begins where |r| exceeds a threshold at two consecutive samples, and
+goes on until the relative velocity, the integral of r from there on, comes back to zero or r stays
+below the threshold.  The threshold stands above the noise of r, which is estimated from r itself.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,7 +18,13 @@ from scipy.stats import t as student
 
 from slipsweep._version import __version__
 from slipsweep.errors import InputError
-from slipsweep.model.parameters import check_finite, check_numbers, check_single, shown, single_friction_coefficient
+from slipsweep.model.parameters import (
+    check_finite,
+    check_numbers,
+    check_single,
+    shown,
+    single_friction_coefficient,
+)
 from slipsweep.model.variables import HISTORY, MEASURED_FRICTION, PARAMETERS, REFERENCE, SLIDES
 from slipsweep.motion.shaking import CHANNELS, TABLE, ShakingTest, read_test, unit_factor
 
@@ -27,43 +33,62 @@ Floats = NDArray[np.float64]
 #: What a caller may give as a test.
 Test = str | Path | ShakingTest | xr.Dataset | Mapping[str, xr.DataArray]
 
-#: The threshold of a slide: standard deviations of the noise of r, of which one sample in 16 000 exceeds 4 by chance,
-#: and at least a part of the table's largest acceleration, by which two sensors may disagree.
-NOISE_IN_THRESHOLD, LEAST_THRESHOLD = 4.0, 0.005
+#: The threshold of a slide: standard deviations of the noise of r, of which one sample in 16 000
+#: exceeds 4 by chance, and at least a part of the table's largest acceleration, by which two
+#: sensors may disagree.
+NOISE_IN_THRESHOLD = 4.0
+LEAST_THRESHOLD = 0.005
 
-#: Samples in turn that begin a slide by exceeding the threshold; that end one by staying below it while the integral
-#: of r is back at zero; and that end one whatever the integral, which a sensor with an offset falsifies.
-_BEGINS, _ENDS, _ENDS_ANYWAY = 2, 4, 20
+#: Samples in turn that begin a slide by exceeding the threshold; that end one by staying below it
+#: while the integral of r is back at zero; and that end one whatever the integral, which a sensor
+#: with an offset falsifies.
+_BEGINS = 2
+_ENDS = 4
+_ENDS_ANYWAY = 20
 
-#: Samples at either end of a slide that are not taken for its friction, and those that show how it begins.
-_AT_ENDS, _FIRST = 3, 6
+#: Samples at either end of a slide that are not taken for its friction, and those that show how it
+#: begins.
+_AT_ENDS = 3
+_FIRST = 6
 
-#: Friction is level if it scatters by this part of itself at most beyond the noise, and Eq. 1 falls if this part of its
-#: samples lies below that part of the static coefficient.
-_LEVEL, _LOW_SHARE, _LOW = 0.05, 0.05, 0.8
+#: Friction is level if it scatters by this part of itself at most beyond the noise, and Eq. 1 falls
+#: if this part of its samples lies below that part of the static coefficient.
+_LEVEL = 0.05
+_LOW_SHARE = 0.05
+_LOW = 0.8
 
-#: Constant friction of so many times the static coefficient given is that of a channel in a wrong unit, or reversed.
+#: Constant friction of so many times the static coefficient given is that of a channel in a wrong
+#: unit, or reversed.
 _TOO_MUCH = 1.25
 
 #: Attributes by which results are known as ours.
 SOURCE = {"source": f"slipsweep {__version__}", "references": REFERENCE}
 
 #: The ends of intervals of results.
-BOUND = xr.Variable(("bound",), [0.025, 0.975], {"units": "1", "long_name": "probability below an end of an interval"})
+BOUND = xr.Variable(
+    ("bound",),
+    [0.025, 0.975],
+    {"units": "1", "long_name": "probability below an end of an interval"},
+)
 
 
 def noise_of(values: Floats) -> float:
     """Standard deviation of the noise of evenly or nearly evenly sampled values: robust, from third differences."""
-    # those of white noise have 20 times its variance; those of a motion that the sampling resolves are small
+    # those of white noise have 20 times its variance; those of a motion that the sampling resolves
+    # are small
     differences = np.diff(values[np.isfinite(values)], 3) / 20.0**0.5
     return float(1.4826 * np.median(np.abs(differences))) if differences.size else 0.0
 
 
 def threshold_of(table: Floats, block: Floats) -> tuple[float, str]:
     """The relative acceleration beyond which the block slides, m/s², and why that much."""
-    noise, least = noise_of(table - block), LEAST_THRESHOLD * float(np.abs(table).max())
+    noise = noise_of(table - block)
+    least = LEAST_THRESHOLD * float(np.abs(table).max())
     if NOISE_IN_THRESHOLD * noise < least:
-        return least, f"{LEAST_THRESHOLD:.1%} of the largest acceleration of the table (the noise is smaller)"
+        return (
+            least,
+            f"{LEAST_THRESHOLD:.1%} of the largest acceleration of the table (the noise is smaller)",
+        )
     why = f"{NOISE_IN_THRESHOLD:g} standard deviations of the noise of the relative acceleration, {noise:.3g} m s-2"
     return NOISE_IN_THRESHOLD * noise, why
 
@@ -73,19 +98,27 @@ def slides_of(times: Floats, table: Floats, block: Floats, threshold: float) -> 
     relative = np.nan_to_num(table - block)
     beyond = np.abs(relative) > threshold
     begins = np.flatnonzero(_in_turn(beyond, _BEGINS))
-    quiet, long_quiet = _in_turn(~beyond, _ENDS), _in_turn(~beyond, _ENDS_ANYWAY)
+    quiet = _in_turn(~beyond, _ENDS)
+    long_quiet = _in_turn(~beyond, _ENDS_ANYWAY)
     slides: list[slice] = []
     at = 0
     while at < times.size and (after := begins[begins >= at]).size:
         onset = int(after[0])
         # back to where r left zero
-        while onset > at and relative[onset - 1] * relative[onset] > 0.0 and abs(relative[onset - 1]) > threshold / 4:
+        while (
+            onset > at
+            and relative[onset - 1] * relative[onset] > 0.0
+            and abs(relative[onset - 1]) > threshold / 4
+        ):
             onset -= 1
         signed = cumulative_trapezoid(relative[onset:], times[onset:], initial=0.0)
-        # at rest r is zero and stays so, and the velocity is back at zero, but for what the noise adds up to
+        # at rest r is zero and stays so, and the velocity is back at zero, but for what the noise
+        # adds up to
         noise = threshold * (times[min(onset + 1, times.size - 1)] - times[onset])
         slow = np.abs(signed) <= 0.1 * np.maximum.accumulate(np.abs(signed)) + noise
-        turned = signed * np.sign(signed[min(_BEGINS, signed.size - 1)]) < 0.0  # as a slide the other way begins
+        turned = (
+            signed * np.sign(signed[min(_BEGINS, signed.size - 1)]) < 0.0
+        )  # as a slide the other way begins
         stops = np.flatnonzero(((quiet[onset:] & slow) | long_quiet[onset:] | turned)[1:])
         slides.append(slice(onset, onset + 2 + int(stops[0]) if stops.size else None))
         at = slides[-1].stop or times.size
@@ -99,7 +132,8 @@ def _in_turn(holds: NDArray[np.bool_], count: int) -> NDArray[np.bool_]:
 
 def onset_acceleration(table: Floats, block: Floats, slide: slice, threshold: float) -> float:
     """The table's acceleration where r left zero: a straight line through the first samples of the slide, back to 0."""
-    relative, to_peak = table - block, slice(slide.start, slide.start + np.argmax(table[slide]) + 1)
+    relative = table - block
+    to_peak = slice(slide.start, slide.start + np.argmax(table[slide]) + 1)
     rising = slide.start + np.flatnonzero(np.abs(relative[to_peak]) > threshold)[:_FIRST]
     if rising.size < 3:
         return float(table[slide.start])
@@ -116,7 +150,9 @@ def free_body_friction(block: Floats, theta: float, g: float) -> Floats:
 def eq1_friction(table: Floats, block: Floats, theta: float, mu_s: float, g: float) -> Floats:
     """μ(t) = tan φs − tan θ − (|Üg| − |Ü| − g tan θ) / (g + Üg tan θ)   (1)"""
     tan_theta = np.tan(np.radians(theta))
-    return np.asarray(mu_s - tan_theta - (np.abs(table) - np.abs(block) - g * tan_theta) / (g + table * tan_theta))
+    return np.asarray(
+        mu_s - tan_theta - (np.abs(table) - np.abs(block) - g * tan_theta) / (g + table * tan_theta)
+    )
 
 
 def coefficients_of(
@@ -124,11 +160,15 @@ def coefficients_of(
 ) -> xr.Dataset:
     """Static and kinetic friction by statics, with 95 % intervals, from the slides that begin downslope.
 
-    The attribute `constant_friction` is a sentence if friction is level while the block slides, where Eq. 1 falls.
+    The attribute `constant_friction` is a sentence if friction is level while the block slides,
+    where Eq. 1 falls.
     """
-    threshold, relative = threshold_of(table, block)[0], table - block
-    eq1, free = eq1_friction(table, block, theta, mu_s, g), free_body_friction(block, theta, g)
-    inside, begins = [], []
+    threshold = threshold_of(table, block)[0]
+    relative = table - block
+    eq1 = eq1_friction(table, block, theta, mu_s, g)
+    free = free_body_friction(block, theta, g)
+    inside = []
+    begins = []
     for slide in slides:
         part = slice(slide.start + _AT_ENDS, (slide.stop or table.size) - _AT_ENDS)
         downslope = np.nanmean(relative[slide.start : slide.start + _AT_ENDS]) > 0.0
@@ -136,15 +176,23 @@ def coefficients_of(
             continue
         inside.append(np.column_stack([free[part], eq1[part]]))
         first = slide.start + int(np.argmax(relative[slide] > threshold))
-        begin, before, after = np.nanmean(block[first : first + _FIRST]), table[max(first - 1, 0)], table[first]
-        jumps = before - begin > threshold  # else it would have been seen to slide at the sample before
+        begin = np.nanmean(block[first : first + _FIRST])
+        before = table[max(first - 1, 0)]
+        after = table[first]
+        jumps = (
+            before - begin > threshold
+        )  # else it would have been seen to slide at the sample before
         begins.append((0.5 * (before + after), 0.5 * (after - before)) if jumps else (begin, 0.0))
     static = kinetic = np.full(3, np.nan)
     constant = False
     if inside:
-        slope = 1.0 / g / np.cos(np.radians(theta)) ** 2  # of friction by the block's acceleration, near enough
-        noise, every = noise_of(block) * slope, np.concatenate(inside)
-        levels, (starts, between) = np.array([np.nanmean(one[:, 0]) for one in inside]), np.array(begins).T
+        slope = (
+            1.0 / g / np.cos(np.radians(theta)) ** 2
+        )  # of friction by the block's acceleration, near enough
+        noise = noise_of(block) * slope
+        every = np.concatenate(inside)
+        levels = np.array([np.nanmean(one[:, 0]) for one in inside])
+        (starts, between) = np.array(begins).T
         kinetic = _mean(levels, noise / (every.shape[0] / len(levels)) ** 0.5, 0.0)
         static = _mean(free_body_friction(starts, theta, g), noise, float(np.mean(between)) * slope)
         scatter = float(np.nanmean((every[:, 0] - kinetic[1]) ** 2)) - noise**2
@@ -153,7 +201,9 @@ def coefficients_of(
     found = {}
     for kind, (low, value, high) in (("static", static), ("kinetic", kinetic)):
         name = f"{kind} friction coefficient by statics"
-        about, of_interval = ({"units": "1", "long_name": text} for text in (name, f"95 % interval of the {name}"))
+        about, of_interval = (
+            {"units": "1", "long_name": text} for text in (name, f"95 % interval of the {name}")
+        )
         found[f"{kind}_friction"] = xr.Variable((), value, about)
         found[f"{kind}_friction_interval"] = xr.Variable(("bound",), [low, high], of_interval)
     sentence = (
@@ -171,7 +221,9 @@ def coefficients_of(
 def _mean(values: Floats, noise: float, systematic: float) -> Floats:
     """Mean of a value a slide within its 95 % interval: their scatter, or the noise, and what does not average out."""
     number = values.size
-    scatter = float(np.std(values, ddof=1)) * float(student.ppf(0.975, number - 1)) if number > 1 else 0.0
+    scatter = (
+        float(np.std(values, ddof=1)) * float(student.ppf(0.975, number - 1)) if number > 1 else 0.0
+    )
     half = max(scatter, 1.96 * noise) / number**0.5 + systematic
     return float(np.mean(values)) + np.array([-half, 0.0, half])
 
@@ -190,24 +242,28 @@ def measured_friction(
 ) -> xr.Dataset:
     """Friction that a test on a shaking table measured, by Eq. 1 and by statics, and the slides in it.
 
-    Eq. 1 of the paper (reference [1] of `sweep`) gives μ(t) from the accelerations of table and block.  It falls also
-    for a block of constant friction.  Statics gives the friction that acts on the block, tan(θ + arctan(Ü/g)).
+    Eq. 1 of the paper (reference [1] of `sweep`) gives μ(t) from the accelerations of table and
+    block.  It falls also for a block of constant friction.  Statics gives the friction that acts on
+    the block, tan(θ + arctan(Ü/g)).
 
     Parameters
     ----------
     test : path, Dataset, mapping of str to DataArray, or ShakingTest
-        A CSV file whose header names columns and units: ``time (s), table acceleration (g), block acceleration
-        (m/s2)``; or a Dataset along `time` (s) with `ground_acceleration` (the table's) and `block_acceleration`,
-        in m/s² or in the unit of their attribute `units`.  Samples need not be evenly spaced.
+        A CSV file whose header names columns and units: ``time (s), table acceleration (g), block
+        acceleration (m/s2)``; or a Dataset along `time` (s) with `ground_acceleration` (the
+        table's) and `block_acceleration`, in m/s² or in the unit of their attribute `units`.
+        Samples need not be evenly spaced.
     theta, mu_s, phi : float
-        Inclination of the base, degrees, and static friction coefficient, or its angle, degrees: mu_s = tan phi.
+        Inclination of the base, degrees, and static friction coefficient, or its angle, degrees:
+        mu_s = tan phi.
     g : float
         Gravity, m/s².
     offset, drift : str or list of str
-        Channels to take a constant, or a straight line, off; "all" for all.  What was taken off, and nothing else is,
-        stands in the attribute `removed`.
+        Channels to take a constant, or a straight line, off; "all" for all.  What was taken off,
+        and nothing else is, stands in the attribute `removed`.
     rest : (float, float), optional
-        From when to when table and block were at rest, s: what is taken off is fitted to these samples, else to all.
+        From when to when table and block were at rest, s: what is taken off is fitted to these
+        samples, else to all.
     threshold : float, optional
         Relative acceleration beyond which the block slides, m/s²; by default 4 standard deviations of its noise, and
         0.5 % of the table's largest acceleration at least.
@@ -215,13 +271,15 @@ def measured_friction(
     Returns
     -------
     Dataset
-        Along `time` (s): `ground_acceleration`, `block_acceleration` (m/s²), `friction_coefficient` μ(t) by Eq. 1,
-        `friction_ratio` μ(t)/μs, and `free_body_friction`, at rest the mobilised friction.
-        Along `slide`: `slide_onset`, `slide_peak` (of the table's acceleration) and `slide_stop` (s; NaN where the
-        record ends before), `onset_acceleration`, `peak_acceleration` and `peak_block_acceleration` (m/s²),
-        `least_friction` (Eq. 1) and `slide_free_body_friction`.  `static_friction` and `kinetic_friction` by statics,
-        each with ``_interval`` (95 %, along `bound`).  The attributes `threshold` (m/s²) and `threshold_from` say how
-        slides were found; `constant_friction` is a sentence if friction is constant by statics where Eq. 1 falls.
+        Along `time` (s): `ground_acceleration`, `block_acceleration` (m/s²), `friction_coefficient`
+        μ(t) by Eq. 1, `friction_ratio` μ(t)/μs, and `free_body_friction`, at rest the mobilised
+        friction. Along `slide`: `slide_onset`, `slide_peak` (of the table's acceleration) and
+        `slide_stop` (s; NaN where the record ends before), `onset_acceleration`,
+        `peak_acceleration` and `peak_block_acceleration` (m/s²), `least_friction` (Eq. 1) and
+        `slide_free_body_friction`.  `static_friction` and `kinetic_friction` by statics, each with
+        ``_interval`` (95 %, along `bound`).  The attributes `threshold` (m/s²) and `threshold_from`
+        say how slides were found; `constant_friction` is a sentence if friction is constant by
+        statics where Eq. 1 falls.
 
     Raises
     ------
@@ -247,14 +305,20 @@ def measured_friction(
             f"{given.name}: block_acceleration: missing: Eq. 1 needs the accelerations of table and block; calibrate "
             "takes a test without"
         )
-    theta, g, mu_s = check_single("theta", theta), check_single("g", g), single_friction_coefficient(mu_s, phi)
+    theta = check_single("theta", theta)
+    g = check_single("g", g)
+    mu_s = single_friction_coefficient(mu_s, phi)
     corrected, removed = given.corrected(offset, drift, rest)
     check_contact(corrected, theta, g)
-    times, table, block = corrected.times, corrected.channels[TABLE], corrected.channels["block_acceleration"]
-    eq1, free = eq1_friction(table, block, theta, mu_s, g), free_body_friction(block, theta, g)
+    times = corrected.times
+    table = corrected.channels[TABLE]
+    block = corrected.channels["block_acceleration"]
+    eq1 = eq1_friction(table, block, theta, mu_s, g)
+    free = free_body_friction(block, theta, g)
     limit, why = threshold_of(table, block)
     if threshold is not None:
-        limit, why = check_finite("threshold", threshold), "given"
+        limit = check_finite("threshold", threshold)
+        why = "given"
         if limit <= 0.0:
             raise InputError(f"threshold = {shown(threshold)}: must be a finite number > 0, m/s²")
     slides = slides_of(times, table, block, limit)
@@ -279,7 +343,10 @@ def measured_friction(
     about = HISTORY | MEASURED_FRICTION
     return xr.Dataset(
         {name: (("time",), values, about[name]) for name, values in series.items()}
-        | {name: (("slide",), np.array(values, np.float64), SLIDES[name]) for name, values in found.items()}
+        | {
+            name: (("slide",), np.array(values, np.float64), SLIDES[name])
+            for name, values in found.items()
+        }
         | dict(coefficients.variables),
         {
             "time": ("time", times, {"units": "s", "long_name": "time"}),
@@ -322,7 +389,8 @@ def test_of(given: Any) -> ShakingTest:
 
 def check_contact(test: ShakingTest, theta: float, g: float) -> None:
     """Refuse a test in which the block would lift off."""
-    table, tan_theta = test.channels[TABLE], float(np.tan(np.radians(theta)))
+    table = test.channels[TABLE]
+    tan_theta = float(np.tan(np.radians(theta)))
     lowest = int(np.argmin(table))
     if g + table[lowest] * tan_theta <= 0.0:
         raise InputError(

@@ -1,7 +1,7 @@
 """Seismic hazard, fragility P(u > d | a), and with both the mean annual rate of exceeding a displacement.
 
-λ(d) = ∫ P(u > d | a) |dν(a)|, where ν(a) is the mean annual rate of peak ground accelerations above a (Cornell 1968):
-exact for the straight lines between points that `displacement_hazard` names.
+λ(d) = ∫ P(u > d | a) |dν(a)|, where ν(a) is the mean annual rate of peak ground accelerations above
+a (Cornell 1968): exact for the straight lines between points that `displacement_hazard` names.
 """
 
 import csv
@@ -21,7 +21,13 @@ from slipsweep.model.units import conversion
 from slipsweep.model.variables import HAZARD_RESULTS
 from slipsweep.motion.formats import read_columns, read_lines
 from slipsweep.studies.sampling import Floats, Thresholds
-from slipsweep.studies.suite_statistics import THRESHOLDS, at_thresholds, point_names, suite_dims, suite_statistics
+from slipsweep.studies.suite_statistics import (
+    THRESHOLDS,
+    at_thresholds,
+    point_names,
+    suite_dims,
+    suite_statistics,
+)
 
 TITLE = "Mean annual rate of exceeding a permanent displacement"
 
@@ -74,12 +80,18 @@ class HazardCurve:
     attrs: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        amplitude, rate = (check_numbers(f"{self.name}: {name}", getattr(self, name)) for name in ("amplitude", "rate"))
+        amplitude, rate = (
+            check_numbers(f"{self.name}: {name}", getattr(self, name))
+            for name in ("amplitude", "rate")
+        )
         if amplitude.ndim != 1 or amplitude.shape != rate.shape or amplitude.size < 2:
             raise InputError(
                 f"{self.name}: {amplitude.size} amplitudes and {rate.size} rates: must be as many of each, 2 at least"
             )
-        for name, values, word, sign in (("amplitude", amplitude, "greater", 1.0), ("rate", rate, "less", -1.0)):
+        for name, values, word, sign in (
+            ("amplitude", amplitude, "greater", 1.0),
+            ("rate", rate, "less", -1.0),
+        ):
             object.__setattr__(self, name, values)
             changes = np.diff(sign * values, prepend=-np.inf) > 0.0
             for at in np.flatnonzero(~(np.isfinite(values) & (values > 0.0) & changes))[:1]:
@@ -90,21 +102,26 @@ class HazardCurve:
 
     def rate_at(self, amplitude: Floats) -> Floats:
         """The rate within the curve, linear between its points in logarithms of both."""
-        return np.asarray(np.exp(np.interp(np.log(amplitude), np.log(self.amplitude), np.log(self.rate))))
+        return np.asarray(
+            np.exp(np.interp(np.log(amplitude), np.log(self.amplitude), np.log(self.rate)))
+        )
 
 
 def read_hazard_curve(path: str | Path, g: float, site: int | None = None) -> HazardCurve:
     """Read a hazard curve of peak ground acceleration from a CSV file; "g" as a unit is `g` m/s², that of the result.
 
-    The first line that is not blank and does not begin with ``#`` names the columns: ``PGA (g), annual rate``.
-    Columns of other names are left out.  Or a file of OpenQuake, whose probabilities of exceedance become annual rates,
-    −ln(1 − p)/T with its investigation time T; `site` is which of its sites, from 1, and needed if it has several.
-    InputError: the file cannot be read, a column is missing or has no unit, or the numbers are no hazard curve.
+    The first line that is not blank and does not begin with ``#`` names the columns: ``PGA (g),
+    annual rate``. Columns of other names are left out.  Or a file of OpenQuake, whose probabilities
+    of exceedance become annual rates, −ln(1 − p)/T with its investigation time T; `site` is which
+    of its sites, from 1, and needed if it has several. InputError: the file cannot be read, a
+    column is missing or has no unit, or the numbers are no hazard curve.
     """
     try:
         path = Path(path)
     except TypeError:
-        raise InputError(f"curve = {shown(path)}: must be the path of a CSV file, or a HazardCurve") from None
+        raise InputError(
+            f"curve = {shown(path)}: must be the path of a CSV file, or a HazardCurve"
+        ) from None
     digest, lines = read_lines(path)
     about = {"hazard_curve_sha256": digest}
     named = next((line for line in lines if line.strip() and not line.startswith("#")), "")
@@ -116,7 +133,9 @@ def read_hazard_curve(path: str | Path, g: float, site: int | None = None) -> Ha
     def holds(column: str, words: set[str], unit: str) -> tuple[str, float] | None:
         where = f"{path}: column {shown(column)}"
         if "probability" in words:
-            raise InputError(f"{where}: must be an annual rate, -ln(1 - p) of an annual probability p")
+            raise InputError(
+                f"{where}: must be an annual rate, -ln(1 - p) of an annual probability p"
+            )
         if words & _RATE:
             if unit.lower() not in _ANNUAL:
                 raise InputError(f"{where}: must be a rate per year, such as annual rate (1/yr)")
@@ -138,36 +157,48 @@ def _openquake_curve(
     head = " ".join(line for line in lines if line.startswith("#"))
     found = re.search(r"investigation_time=([\d.eE+-]+)", head)
     if found is None:
-        raise InputError(f"{path}: no investigation_time in its first line: it is needed for annual rates")
+        raise InputError(
+            f"{path}: no investigation_time in its first line: it is needed for annual rates"
+        )
     measure = re.search(r"imt='?([^',\"]+)", head)
     if measure is not None and measure[1] != "PGA":
         raise InputError(f"{path}: curves of {measure[1]}: must be of PGA")
     names, *rows = csv.reader(line for line in lines if line.strip() and not line.startswith("#"))
     if not 1 <= (1 if site is None else site) <= len(rows) or (site is None and len(rows) > 1):
-        raise InputError(f"{path}: {len(rows)} sites: give the number of one, site = 1 to {len(rows)} (--site)")
+        raise InputError(
+            f"{path}: {len(rows)} sites: give the number of one, site = 1 to {len(rows)} (--site)"
+        )
     row = dict(zip(names, rows[(site or 1) - 1], strict=False))
     try:
-        levels = {float(match[1]): float(row[name]) for name in names if (match := _POE.fullmatch(name))}
+        levels = {
+            float(match[1]): float(row[name]) for name in names if (match := _POE.fullmatch(name))
+        }
     except (KeyError, ValueError):
         raise InputError(f"{path}: site {site or 1}: must have a number for each level") from None
-    amplitude, probability = np.array([*levels]), np.array([*levels.values()])
+    amplitude = np.array([*levels])
+    probability = np.array([*levels.values()])
     if not ((probability >= 0.0) & (probability <= 1.0)).all():
         raise InputError(f"{path}: site {site or 1}: probabilities must be from 0 to 1")
-    # at 1 the rate is not known, at 0 there is none; printed probabilities of neighbours may be the same
+    # at 1 the rate is not known, at 0 there is none; printed probabilities of neighbours may be the
+    # same
     used = (probability > 0.0) & (probability < 1.0) & (np.diff(probability, prepend=np.inf) != 0.0)
     where = {f"hazard_curve_{name}": row[name] for name in ("lon", "lat") if name in row}
     rate = -np.log1p(-probability[used]) / float(found[1])
     return HazardCurve(amplitude[used] * g, rate, str(path), {**about, **where})
 
 
-def fragility(result: xr.Dataset, thresholds: Thresholds | None = None, over: Any = None) -> xr.Dataset:
+def fragility(
+    result: xr.Dataset, thresholds: Thresholds | None = None, over: Any = None
+) -> xr.Dataset:
     """Probability of exceeding displacements along `amplitude`, of a suite, of uncertain inputs, or of both.
 
-    Arguments are those of `displacement_hazard`.  The result has `exceedance_probability` (dimensions of the grid,
-    amplitude, threshold) and `valueless_share`.  InputError: no dimension `amplitude` of two values or more, no suite
-    and nothing uncertain, or no such threshold.
+    Arguments are those of `displacement_hazard`.  The result has `exceedance_probability`
+    (dimensions of the grid, amplitude, threshold) and `valueless_share`.  InputError: no dimension
+    `amplitude` of two values or more, no suite and nothing uncertain, or no such threshold.
     """
-    name = "exceedance_probability" if "exceedance_probability" in result else "permanent_displacement"
+    name = (
+        "exceedance_probability" if "exceedance_probability" in result else "permanent_displacement"
+    )
     if name in result and result[name].sizes.get("amplitude", 1) < 2:
         raise InputError(
             "result: amplitude: must be a dimension of two peak ground accelerations or more: the probability of "
@@ -180,53 +211,74 @@ def fragility(result: xr.Dataset, thresholds: Thresholds | None = None, over: An
     else:
         found = at_thresholds(result[wanted].load(), thresholds)
         dims = suite_dims(found["exceedance_probability"], over) if "motion" in found.dims else ()
-        pooled = re.findall(r"\d+ (\w+)", str(result.attrs.get("pooled", "")))  # of "4 motion x 2 polarity"
-        found = found.mean(dims, keep_attrs=True).assign_attrs(suite_dimensions=" ".join((*dims, *pooled, "samples")))
+        pooled = re.findall(
+            r"\d+ (\w+)", str(result.attrs.get("pooled", ""))
+        )  # of "4 motion x 2 polarity"
+        found = found.mean(dims, keep_attrs=True).assign_attrs(
+            suite_dimensions=" ".join((*dims, *pooled, "samples"))
+        )
     # none exceeds anything at 0, which has no logarithm
-    found = found.isel(amplitude=np.flatnonzero(found["amplitude"].values > 0.0)).sortby("amplitude")
+    found = found.isel(amplitude=np.flatnonzero(found["amplitude"].values > 0.0)).sortby(
+        "amplitude"
+    )
     return found.transpose(..., "amplitude", "threshold")
 
 
 def openquake_fragility(found: xr.Dataset) -> str:
     """A fragility as an XML file of OpenQuake (NRML 0.5): a discrete function for each grid point.
 
-    Thresholds of `found` (`fragility`) are the limit states, amplitudes are in g.  The first is the limit of no damage:
-    nothing is extrapolated to it.  InputError: a probability is missing, as the model gives no value there.
+    Thresholds of `found` (`fragility`) are the limit states, amplitudes are in g.  The first is the
+    limit of no damage: nothing is extrapolated to it.  InputError: a probability is missing, as the
+    model gives no value there.
     """
     g = float(found.attrs["g"])
     probability = found["exceedance_probability"].transpose(..., "threshold", "amplitude")
     if probability.isnull().any():
-        raise InputError("no value under any motion or sample at some amplitudes: cut the axis amplitude")
+        raise InputError(
+            "no value under any motion or sample at some amplitudes: cut the axis amplitude"
+        )
     states = [f"u_above_{d * 1000.0:.6g}_mm" for d in found["threshold"].values]
-    grid = {dim: size for dim, size in probability.sizes.items() if dim not in ("threshold", "amplitude")}
+    grid = {
+        dim: size
+        for dim, size in probability.sizes.items()
+        if dim not in ("threshold", "amplitude")
+    }
     levels = found["amplitude"].values / g
     root = xml.Element("nrml", xmlns="http://openquake.org/xmlns/nrml/0.5")
     own = {"id": "slipsweep", "assetCategory": "slopes", "lossCategory": "structural"}
     model = xml.SubElement(root, "fragilityModel", own)
-    xml.SubElement(model, "description").text = f"{found.attrs.get('title', '')} ({found.attrs.get('source', '')})"
+    xml.SubElement(
+        model, "description"
+    ).text = f"{found.attrs.get('title', '')} ({found.attrs.get('source', '')})"
     xml.SubElement(model, "limitStates").text = " ".join(states)
     curves = probability.values.reshape(-1, len(states), levels.size)
     for name, rows in zip(point_names(found, grid), curves, strict=True):
         own_id = "_".join(name.replace("=", " ").replace(",", " ").split())
-        function = xml.SubElement(model, "fragilityFunction", id=own_id or "block", format="discrete")
+        function = xml.SubElement(
+            model, "fragilityFunction", id=own_id or "block", format="discrete"
+        )
         imls = xml.SubElement(function, "imls", imt="PGA", noDamageLimit=f"{levels[0]:.6g}")
         imls.text = " ".join(f"{one:.6g}" for one in levels)
         for state, row in zip(states, rows, strict=True):
             xml.SubElement(function, "poes", ls=state).text = " ".join(f"{one:.6g}" for one in row)
     xml.indent(root)
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + xml.tostring(root, encoding="unicode") + "\n"
+    return (
+        '<?xml version="1.0" encoding="UTF-8"?>\n' + xml.tostring(root, encoding="unicode") + "\n"
+    )
 
 
 def exceedance_rates(curve: HazardCurve, amplitude: Any, probability: Any) -> dict[str, Floats]:
     """Integrate a fragility over a hazard curve: the rates of `displacement_hazard`.
 
-    `probability` has that of exceedance at each `amplitude` (m/s², > 0, increasing, two at least) along its first
-    dimension.  InputError: no amplitude lies within the curve.
+    `probability` has that of exceedance at each `amplitude` (m/s², > 0, increasing, two at least)
+    along its first dimension.  InputError: no amplitude lies within the curve.
     """
     from scipy.interpolate import make_interp_spline
 
-    given, shares = np.asarray(amplitude, np.float64), np.asarray(probability, np.float64)
-    low, high = max(given[0], curve.amplitude[0]), min(given[-1], curve.amplitude[-1])
+    given = np.asarray(amplitude, np.float64)
+    shares = np.asarray(probability, np.float64)
+    low = max(given[0], curve.amplitude[0])
+    high = min(given[-1], curve.amplitude[-1])
     if low >= high:
         raise InputError(
             f"{curve.name}: reaches from {curve.amplitude[0]:.6g} to {curve.amplitude[-1]:.6g} m/s2, and the "
@@ -236,12 +288,15 @@ def exceedance_rates(curve: HazardCurve, amplitude: Any, probability: Any) -> di
     points = points[(points >= low) & (points <= high)]
     rates = curve.rate_at(points)
     chances = make_interp_spline(np.log(given), shares, k=1)(np.log(points))
-    # P is straight in ln a, ν is exp(-k ln a): ∫ P |dν| = P₁ (ν₁ - ν₂) + (P₂ - P₁) ((ν₁ - ν₂) / (k h) - ν₂)
+    # P is straight in ln a, ν is exp(-k ln a): ∫ P |dν| = P₁ (ν₁ - ν₂) + (P₂ - P₁) ((ν₁ - ν₂) / (k
+    # h) - ν₂)
     falls = -np.diff(np.log(rates))
     drops = rates[1:] * np.expm1(falls)
     with np.errstate(invalid="ignore", divide="ignore"):
         weights = np.where(falls > 1e-6, drops / falls - rates[1:], 0.5 * drops)
-    inside = np.tensordot(drops, chances[:-1], 1) + np.tensordot(weights, np.diff(chances, axis=0), 1)
+    inside = np.tensordot(drops, chances[:-1], 1) + np.tensordot(
+        weights, np.diff(chances, axis=0), 1
+    )
     held = chances[-1] * rates[-1]
     below = np.clip(np.searchsorted(given, points[:-1], side="right") - 1, 0, given.size - 2)
     ends = np.sort([shares[below], shares[below + 1]], axis=0)
@@ -266,18 +321,21 @@ def displacement_hazard(
 ) -> xr.Dataset:
     """Mean annual rates of exceeding displacements (Cornell [1]_), from a hazard curve and a fragility.
 
-    P(u > d | A) is the share of the motions, or of the samples of uncertain inputs, that exceed d; it is straight in
-    ln A between the amplitudes of the result.  The hazard curve is straight in logarithms of both between its points.
+    P(u > d | A) is the share of the motions, or of the samples of uncertain inputs, that exceed d;
+    it is straight in ln A between the amplitudes of the result.  The hazard curve is straight in
+    logarithms of both between its points.
 
     Parameters
     ----------
     result : Dataset
-        A result of `sweep` with the dimensions `motion` and `amplitude`, or of `sample` with `amplitude`: motions of a
-        suite that were not pooled are equally likely.
+        A result of `sweep` with the dimensions `motion` and `amplitude`, or of `sample` with
+        `amplitude`: motions of a suite that were not pooled are equally likely.
     curve : HazardCurve, str or Path
-        Or a CSV file with the columns "PGA (g)" and "annual rate", or one of OpenQuake's with one site.
+        Or a CSV file with the columns "PGA (g)" and "annual rate", or one of OpenQuake's with one
+        site.
     thresholds : float, str or list of these, optional
-        In m or with a unit, as in `suite_statistics`; of a result of `sample` some of its own, by default all.
+        In m or with a unit, as in `suite_statistics`; of a result of `sample` some of its own, by
+        default all.
     over : str or list of str, optional
         As in `suite_statistics`.
 
@@ -297,8 +355,9 @@ def displacement_hazard(
     Raises
     ------
     InputError
-        As `suite_statistics`; the curve does not overlap with the amplitudes; or only two amplitudes have a value, and
-        different probabilities: what lies between them is then not known.
+        As `suite_statistics`; the curve does not overlap with the amplitudes; or only two
+        amplitudes have a value, and different probabilities: what lies between them is then not
+        known.
     RunError
         There is no rate at any grid point.
 
@@ -339,13 +398,21 @@ def displacement_hazard(
                 "result: amplitude: only two peak ground accelerations have a value, and P(u > d) differs between "
                 "them; how it grows in between is not known: run the sweep with more values on the axis amplitude"
             )
-        for name, values in exceedance_rates(curve, amplitude[there], own).items() if len(own) > 1 else ():
+        for name, values in (
+            exceedance_rates(curve, amplitude[there], own).items() if len(own) > 1 else ()
+        ):
             results[name][point] = values
     if results["annual_rate"].isnull().all():
-        raise RunError("no annual rate: the model gives no value under any motion at two amplitudes or more")
+        raise RunError(
+            "no annual rate: the model gives no value under any motion at two amplitudes or more"
+        )
     for name, one in results.items():
         one.attrs = HAZARD_RESULTS[name]
-    coords = {name: one.variable for name, one in found.coords.items() if "amplitude" not in (*one.dims, name)}
+    coords = {
+        name: one.variable
+        for name, one in found.coords.items()
+        if "amplitude" not in (*one.dims, name)
+    }
     found.attrs.pop("zero_displacement", None)
     attrs = {**found.attrs, "title": TITLE, "hazard_curve": curve.name, **curve.attrs}
     ranges = {"hazard_curve_range": curve.amplitude[[0, -1]], "amplitude_range": amplitude[[0, -1]]}

@@ -57,23 +57,26 @@ def simulate(
     Parameters
     ----------
     theta, mu_s, amplitude, frequency : float
-        One case; these and the remaining parameters as in `slipsweep.sweep`, but that of a suite one motion is taken:
-        ``excitation=suite["label"]``, of a pair ``suite["label"].rotated(azimuth)``.
+        One case; these and the remaining parameters as in `slipsweep.sweep`, but that of a suite
+        one motion is taken: ``excitation=suite["label"]``, of a pair
+        ``suite["label"].rotated(azimuth)``.
     times : array, optional
-        Times to sample, s, increasing, and not negative under a waveform; by default `points_per_cycle` a cycle, from 0
-        to the end of the shaking, or the times of a record's samples; and on until the block has come to rest, if that
-        is later.  A slide that lasts long after the shaking has as many points as 100 cycles have (after a record
-        20 000, or as many as it has samples), evenly spaced.
+        Times to sample, s, increasing, and not negative under a waveform; by default
+        `points_per_cycle` a cycle, from 0 to the end of the shaking, or the times of a record's
+        samples; and on until the block has come to rest, if that is later.  A slide that lasts long
+        after the shaking has as many points as 100 cycles have (after a record 20 000, or as many
+        as it has samples), evenly spaced.
     points_per_cycle : int, optional
         Samples a cycle where `times` is not given, 512 by default; not with a record.
 
     Returns
     -------
     Dataset
-        Along `time` (s): `ground_acceleration`, `block_acceleration` (m/s²), `friction_coefficient` (what Eq. 1 gives
-        for the two; not with `yield_coefficient`), `relative_velocity` (m/s) and `relative_displacement` (m); and the
-        results of `sweep` for the case.  Where the base's acceleration jumps, as at the end of a record, the values are
-        those after the jump.  NaN where the case has no value (`validity`).
+        Along `time` (s): `ground_acceleration`, `block_acceleration` (m/s²), `friction_coefficient`
+        (what Eq. 1 gives for the two; not with `yield_coefficient`), `relative_velocity` (m/s) and
+        `relative_displacement` (m); and the results of `sweep` for the case.  Where the base's
+        acceleration jumps, as at the end of a record, the values are those after the jump.  NaN
+        where the case has no value (`validity`).
 
     Raises
     ------
@@ -96,19 +99,33 @@ def simulate(
     331 mm after 2.78 s
     """
     inputs = grid_inputs.Inputs(
-        theta=theta, mu_s=mu_s, phi=phi, amplitude=amplitude, frequency=frequency,
-        displacement_amplitude=displacement_amplitude, scale=scale, pgv=pgv, arias_intensity=arias_intensity,
-        time_scale=time_scale, polarity=polarity, yield_acceleration=yield_acceleration,
-        yield_coefficient=yield_coefficient, decay_rate=decay_rate, delta_mu=delta_mu,
-        minimum_friction=minimum_friction, structure_frequency=structure_frequency,
-    )  # fmt: skip
+        theta=theta,
+        mu_s=mu_s,
+        phi=phi,
+        amplitude=amplitude,
+        frequency=frequency,
+        displacement_amplitude=displacement_amplitude,
+        scale=scale,
+        pgv=pgv,
+        arias_intensity=arias_intensity,
+        time_scale=time_scale,
+        polarity=polarity,
+        yield_acceleration=yield_acceleration,
+        yield_coefficient=yield_coefficient,
+        decay_rate=decay_rate,
+        delta_mu=delta_mu,
+        minimum_friction=minimum_friction,
+        structure_frequency=structure_frequency,
+    )
     problem = grid_inputs.check_problem(excitation, model, "cycle")
     motion = problem.excitation
     if isinstance(motion, Suite):
         one_motion = f"suite[{motion.labels[0]!r}]{'.rotated(azimuth)' if motion.has_pairs else ''}"
         raise InputError(f"excitation: simulate takes one motion of a Suite, such as {one_motion}")
     if points_per_cycle is not None and isinstance(motion, Record):
-        raise InputError("points_per_cycle: not allowed with a Record, whose samples are the points; give times")
+        raise InputError(
+            "points_per_cycle: not allowed with a Record, whose samples are the points; give times"
+        )
     plan = plans.plan_sweep(inputs, excitation=motion, model=problem.model)
     for name, variable in plan.coords.items():
         if variable.dims:
@@ -116,14 +133,18 @@ def simulate(
     one = _History(problem, plan.coords, plan.solve())
     if times is None:
         points = 512 if points_per_cycle is None else points_per_cycle
-        phases = one.points(parameters.check_whole("points_per_cycle", points, 4, parameters.MOST_POINTS))
+        phases = one.points(
+            parameters.check_whole("points_per_cycle", points, 4, parameters.MOST_POINTS)
+        )
         grid = phases * one.unit
     else:
         grid = np.atleast_1d(parameters.check_numbers("times", times))
         least, sign = (0.0, " >= 0") if isinstance(motion, Waveform) else (-math.inf, "")
         with np.errstate(over="ignore"):
             phases = grid / one.unit
-        increasing = grid.ndim == 1 and grid.size and (np.diff(grid) > 0.0).all() and grid[0] >= least
+        increasing = (
+            grid.ndim == 1 and grid.size and (np.diff(grid) > 0.0).all() and grid[0] >= least
+        )
         if not increasing or not np.isfinite(phases).all():
             raise InputError(f"times: must be one row of finite, increasing numbers{sign}")
     time = xr.Variable(("time",), grid, {"units": "s", "long_name": "time"})
@@ -134,9 +155,14 @@ def simulate(
 class _History:
     """One case, its results as a sweep gives them, and its history; phases are ωt, or a record's times at scale 1."""
 
-    def __init__(self, problem: grid_inputs.Problem, inputs: Mapping[str, xr.Variable], summary: xr.Dataset) -> None:
-        self.problem, self.inputs, self.summary = problem, inputs, summary
-        given, motion = engine.cell_inputs(problem, inputs), problem.excitation
+    def __init__(
+        self, problem: grid_inputs.Problem, inputs: Mapping[str, xr.Variable], summary: xr.Dataset
+    ) -> None:
+        self.problem = problem
+        self.inputs = inputs
+        self.summary = summary
+        given = engine.cell_inputs(problem, inputs)
+        motion = problem.excitation
         self.cell = Cell(*(float(given.get(name, math.nan)) for name in Cell._fields))
         self.options = solvers.options_of(problem, wants_peak=True)
         self.record = motion if isinstance(motion, Record) else None
@@ -150,9 +176,12 @@ class _History:
 
     def sampled(self, phases: Floats) -> Floats:
         """The rows of `HISTORY` at phases, velocity and displacement in units of phase."""
-        table, workspace = np.empty((len(HISTORY), phases.size)), exact.workspace_of(self.wave, keeps_log=True)
+        table = np.empty((len(HISTORY), phases.size))
+        workspace = exact.workspace_of(self.wave, keeps_log=True)
         fill = kernels.fill_history if self.record is None else kernels.fill_recorded_history
-        _interruptible(fill, self.cell, self.options, self.wave, workspace, phases, kernels.History(*table))
+        _interruptible(
+            fill, self.cell, self.options, self.wave, workspace, phases, kernels.History(*table)
+        )
         if self.valueless:  # from the beginning on, also where the flag is raised later
             table[1:] = math.nan
         return table
@@ -166,9 +195,17 @@ class _History:
             found["relative_velocity"] *= self.unit
             found["relative_displacement"] *= self.unit * self.unit
         if not self.valueless and not all(np.isfinite(values).all() for values in found.values()):
-            given = ", ".join(f"{name} = {parameters.number_text(float(one))}" for name, one in self.inputs.items())
-            raise InputError(f"{given}: the history is then no finite number in double precision; must be nearer to 1")
-        return {name: xr.Variable(("time",), values.copy(), HISTORY[name]) for name, values in found.items()}
+            given = ", ".join(
+                f"{name} = {parameters.number_text(float(one))}"
+                for name, one in self.inputs.items()
+            )
+            raise InputError(
+                f"{given}: the history is then no finite number in double precision; must be nearer to 1"
+            )
+        return {
+            name: xr.Variable(("time",), values.copy(), HISTORY[name])
+            for name, values in found.items()
+        }
 
     def half_waves(self) -> dict[str, xr.Variable]:
         """The positive half waves of a record, and the sliding mode of each (`HALF_WAVES`); of a waveform none."""
@@ -188,23 +225,33 @@ class _History:
             "half_wave_peak": peak,
             "half_wave_mode": mode,
         }
-        return {name: xr.Variable(("half_wave",), values, variables.HALF_WAVES[name]) for name, values in found.items()}
+        return {
+            name: xr.Variable(("half_wave",), values, variables.HALF_WAVES[name])
+            for name, values in found.items()
+        }
 
     def points(self, points_per_cycle: int) -> Floats:
         """Phases of so many points a cycle, or the samples of a record, and on to the end of the slide."""
         # of the shaking, and most of a slide after it
         if self.record is not None:
-            count, most = self.record.times.size, max(20_000, self.record.times.size)
+            count = self.record.times.size
+            most = max(20_000, self.record.times.size)
             step = float(np.ptp(self.record.times)) / (count - 1)
         else:
-            count, most = points_per_cycle * self.options.cycles + 1, 100 * points_per_cycle
+            count = points_per_cycle * self.options.cycles + 1
+            most = 100 * points_per_cycle
             step = 2.0 * math.pi / points_per_cycle
         # the table, its columns apart, phases and times
         needed = (count + most) * 8 * (2 * len(HISTORY) + 2)
         advice = "take fewer cycles or points_per_cycle, or give times"
         resources.check_memory(f"a history of {count + most:.4g} points", needed, advice)
-        shaken = self.record.times if self.record is not None else step * np.arange(count, dtype=np.float64)
-        after, stick_slip = 0.0, variables.SlidingMode.STICK_SLIP
+        shaken = (
+            self.record.times
+            if self.record is not None
+            else step * np.arange(count, dtype=np.float64)
+        )
+        after = 0.0
+        stick_slip = variables.SlidingMode.STICK_SLIP
         if not self.valueless and self.summary.get("sliding_mode", stick_slip) == stick_slip:
             ground, block, _, velocity, _ = self.sampled(shaken[-1:])[:, 0]
             # after the shaking the block is still braked, by b = Ü - Üg (Eq. 12)
@@ -215,7 +262,8 @@ class _History:
                 "the block slides on after the shaking for more cycles than double precision holds; give times, or a "
                 "larger yield_acceleration"
             )
-        # a slide that brakes by 1e-7 m/s² lasts for months: under a constant deceleration few points are enough
+        # a slide that brakes by 1e-7 m/s² lasts for months: under a constant deceleration few
+        # points are enough
         beyond = math.ceil(min(after, most * step) / step)
         # a hair further than the end, which is rounded
         rest = np.linspace(0.0, max(after * (1.0 + 1e-12), beyond * step), beyond + 1)[1:]

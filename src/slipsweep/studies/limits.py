@@ -1,10 +1,11 @@
 """The inverse of a sweep: the smallest amplitude at which a tolerable displacement is reached.
 
-The displacement u(A) jumps where the sliding mode changes, may fall after a jump, and has gaps where the model gives no
-value.  So every block is first scanned from its yield acceleration upwards, including both sides of the amplitudes at
-which its mode changes.  Steps of the scan that may hide a peak are cut into parts, and where u jumps or grows beyond
-all bounds the place is located; docs/limit.md says what is missed all the same.  The first step that reaches the target
-is halved until two neighbouring double-precision numbers are left.  All cells are solved together.
+The displacement u(A) jumps where the sliding mode changes, may fall after a jump, and has gaps
+where the model gives no value.  So every block is first scanned from its yield acceleration
+upwards, including both sides of the amplitudes at which its mode changes.  Steps of the scan that
+may hide a peak are cut into parts, and where u jumps or grows beyond all bounds the place is
+located; docs/limit.md says what is missed all the same.  The first step that reaches the target is
+halved until two neighbouring double-precision numbers are left.  All cells are solved together.
 """
 
 import math
@@ -33,7 +34,8 @@ from slipsweep.studies.datasets import Values
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-#: Cells, and intervals of amplitude in which they reach their targets: not at the lower end, but at the upper one.
+#: Cells, and intervals of amplitude in which they reach their targets: not at the lower end, but at
+#: the upper one.
 Steps = tuple[Indices, Floats, Floats]
 
 TITLE = "Amplitudes at which a tolerable displacement is reached"
@@ -50,7 +52,8 @@ JUMP = 1e-6
 #: Displacements scanned together: 16 MB, and as much again to compare them.
 SCANNED = 2_000_000
 
-#: Inputs on which no scan depends: those that only scale its result, or only flag it, and the target.
+#: Inputs on which no scan depends: those that only scale its result, or only flag it, and the
+#: target.
 _AFTER_SCAN = ("frequency", "time_scale", "structure_frequency", "displacement")
 
 
@@ -79,23 +82,26 @@ def limit_amplitude(
 ) -> xr.Dataset:
     """Smallest amplitude at which the permanent displacement reaches a tolerable one.
 
-    The inverse of `sweep`, exact to the last bit: `sweep` with the cycle solver gives at least `displacement` at the
-    amplitude returned, and less (or no value) at the double-precision number before it.
+    The inverse of `sweep`, exact to the last bit: `sweep` with the cycle solver gives at least
+    `displacement` at the amplitude returned, and less (or no value) at the double-precision number
+    before it.
 
-    The displacement u(A) need not grow with A, jumps where the sliding mode changes, and has gaps where the model gives
-    no value (`validity`), so that a displacement may be reached at several amplitudes, or passed in a jump.  The
-    smallest is returned: the first step of a scan with ``u >= displacement`` holds it.  The scan runs from the yield
-    acceleration to `maximum_amplitude` in `amplitude_steps` equal ratios, finer where it may hide a peak, and has both
-    sides of the change of mode.  A peak narrower than a part of a step can be missed.  Under a record the amplitude is
-    that peak ground acceleration to which it is scaled, and the scan has both sides of every amplitude at which one of
-    its 128 highest pulses begins to count, or changes its mode.
+    The displacement u(A) need not grow with A, jumps where the sliding mode changes, and has gaps
+    where the model gives no value (`validity`), so that a displacement may be reached at several
+    amplitudes, or passed in a jump.  The smallest is returned: the first step of a scan with ``u >=
+    displacement`` holds it.  The scan runs from the yield acceleration to `maximum_amplitude` in
+    `amplitude_steps` equal ratios, finer where it may hide a peak, and has both sides of the change
+    of mode.  A peak narrower than a part of a step can be missed.  Under a record the amplitude is
+    that peak ground acceleration to which it is scaled, and the scan has both sides of every
+    amplitude at which one of its 128 highest pulses begins to count, or changes its mode.
 
     Parameters
     ----------
     displacement : float, array or DataArray, str or list of str
         Tolerable permanent displacement, > 0, m or with a unit ("50mm").
     theta, mu_s, frequency : float, array or DataArray
-        These and the remaining parameters as in `sweep`; the solver is "cycle".  A record has a `time_scale` instead.
+        These and the remaining parameters as in `sweep`; the solver is "cycle".  A record has a
+        `time_scale` instead.
     maximum_amplitude : float, optional
         Where the search ends, m/s²; by default 5 g.
     amplitude_steps : int
@@ -108,8 +114,8 @@ def limit_amplitude(
 
         - `limit_amplitude`, m/s²; NaN where there is none.
         - `limit_status`: 0 reached, 1 at_mode_jump, 2 at_jump (u rises by more than 1e-6 of itself between neighbouring
-          numbers, with and without a change of sliding mode), 3 after_gap (no value just below), 4 not_reached,
-          5 invalid (no value anywhere).
+          numbers, with and without a change of sliding mode), 3 after_gap (no value just below), 4
+          not_reached, 5 invalid (no value anywhere).
         - `permanent_displacement`, m, and `sliding_mode` (under a record the counts of slips and pulses) at the
           limit; more than `displacement` where a discontinuity of the model sets the limit.
         - `validity` at the limit or, where there is none, at `maximum_amplitude`.
@@ -132,16 +138,31 @@ def limit_amplitude(
     array([3.34 , 3.756])
     """
     inputs = Inputs(
-        theta=theta, mu_s=mu_s, phi=phi, frequency=frequency, time_scale=time_scale, polarity=polarity,
-        azimuth=azimuth, yield_acceleration=yield_acceleration, yield_coefficient=yield_coefficient,
-        decay_rate=decay_rate, delta_mu=delta_mu, minimum_friction=minimum_friction,
+        theta=theta,
+        mu_s=mu_s,
+        phi=phi,
+        frequency=frequency,
+        time_scale=time_scale,
+        polarity=polarity,
+        azimuth=azimuth,
+        yield_acceleration=yield_acceleration,
+        yield_coefficient=yield_coefficient,
+        decay_rate=decay_rate,
+        delta_mu=delta_mu,
+        minimum_friction=minimum_friction,
         structure_frequency=structure_frequency,
-    )  # fmt: skip
+    )
     plan = plan_limits(
-        displacement, inputs, excitation=excitation, model=model,
-        maximum_amplitude=maximum_amplitude, amplitude_steps=amplitude_steps,
-    )  # fmt: skip
-    return plan.solve(progress).assign_coords(datasets.brought_coordinates(inputs, plan.coords, plan.names))
+        displacement,
+        inputs,
+        excitation=excitation,
+        model=model,
+        maximum_amplitude=maximum_amplitude,
+        amplitude_steps=amplitude_steps,
+    )
+    return plan.solve(progress).assign_coords(
+        datasets.brought_coordinates(inputs, plan.coords, plan.names)
+    )
 
 
 def plan_limits(
@@ -156,9 +177,17 @@ def plan_limits(
     """Plan of `limit_amplitude`, as which parameters and errors are; `inputs` have no strength of the shaking."""
 
     def in_m(given: Any) -> Any:
-        return units.quantity("displacement", given, "m", math.nan) if isinstance(given, str) else given
+        return (
+            units.quantity("displacement", given, "m", math.nan)
+            if isinstance(given, str)
+            else given
+        )
 
-    displacement = [in_m(one) for one in displacement] if isinstance(displacement, list) else in_m(displacement)
+    displacement = (
+        [in_m(one) for one in displacement]
+        if isinstance(displacement, list)
+        else in_m(displacement)
+    )
     values = parameters.check_values("displacement", displacement)
     dims = getattr(displacement, "dims", ("displacement",) * values.ndim)
     if not values.size or len({*dims}) < values.ndim:
@@ -167,9 +196,12 @@ def plan_limits(
         )
     target = xr.Variable(dims, values, variables.TOLERABLE_DISPLACEMENT)
     steps = parameters.check_whole("amplitude_steps", amplitude_steps, 2, 1_000_000)
-    # displacement and amplitude change places: in the layout of the grid it stands where the amplitude would
+    # displacement and amplitude change places: in the layout of the grid it stands where the
+    # amplitude would
     swapped = replace(inputs, amplitude=xr.Variable(dims, values))
-    plan = plan_sweep(swapped, excitation=excitation, model=model, variables=["permanent_displacement"])
+    plan = plan_sweep(
+        swapped, excitation=excitation, model=model, variables=["permanent_displacement"]
+    )
     ((_, request),) = plan.tasks
     if maximum_amplitude is None:
         maximum_amplitude = variables.MAXIMUM_AMPLITUDE_IN_G * request.problem.model.g
@@ -184,10 +216,16 @@ def plan_limits(
     request = replace(request, inputs=solved, wanted=names)
     return replace(
         plan,
-        coords={name: one for name, one in plan.coords.items() if name != "amplitude"} | {"displacement": target},
+        coords={name: one for name, one in plan.coords.items() if name != "amplitude"}
+        | {"displacement": target},
         tasks=((partial(_solve, highest, steps), request),),
         names=names,
-        attrs={**plan.attrs, "title": TITLE, "maximum_amplitude": highest, "amplitude_steps": steps},
+        attrs={
+            **plan.attrs,
+            "title": TITLE,
+            "maximum_amplitude": highest,
+            "amplitude_steps": steps,
+        },
         # one scan of a block serves all its targets, each of which takes some 100 cells in addition
         cost=plan.cost * (max(1.0, steps / math.prod(scaled.values())) + 100.0),
         together=tuple(scaled),
@@ -216,7 +254,8 @@ def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> dict[
     scan = Scan(request, maximum_amplitude, steps)
     cell, low, high = _limits(scan)
     wanted = tuple(name for name in request.wanted if not name.startswith("limit_"))
-    before, after = scan.solve(low, cell, wanted), scan.solve(high, cell, wanted)
+    before = scan.solve(low, cell, wanted)
+    after = scan.solve(high, cell, wanted)
     results = {name: one.data.ravel() for name, one in request.results().items()}
     for values in results.values():
         values[:] = math.nan if values.dtype.kind == "f" else variables.SlidingMode.MISSING
@@ -226,9 +265,12 @@ def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> dict[
     results["limit_status"][:] = np.where(valueless, LimitStatus.INVALID, LimitStatus.NOT_REACHED)
     for name, values in {**after, "limit_amplitude": high}.items():
         results[name][cell] = values
-    below, above = before["permanent_displacement"], after["permanent_displacement"]
+    below = before["permanent_displacement"]
+    above = after["permanent_displacement"]
     jumps = above - below > JUMP * above
-    modes = [name for name in ("sliding_mode", "stick_slip_pulses", "continuous_pulses") if name in after]
+    modes = [
+        name for name in ("sliding_mode", "stick_slip_pulses", "continuous_pulses") if name in after
+    ]
     other_mode = np.any([before[name] != after[name] for name in modes], axis=0)
     results["limit_status"][cell] = np.select(
         [np.isnan(below), jumps & other_mode, jumps],
@@ -242,10 +284,12 @@ class Scan:
     """Cells that one motion shakes, at increasing amplitudes: those of a part of a grid."""
 
     def __init__(self, request: Request, maximum_amplitude: float, steps: int) -> None:
-        self.problem, inputs = request.problem, dict(request.inputs)
+        self.problem = request.problem
+        inputs = dict(request.inputs)
         displacement = inputs.pop("displacement")
         amplitudes = _scanned_amplitudes(request, maximum_amplitude, steps)
-        # the dimensions of the grid are kept here, as blocks that differ only in their frequency are solved once
+        # the dimensions of the grid are kept here, as blocks that differ only in their frequency
+        # are solved once
         every = inputs | {"amplitude": amplitudes}
         slips = ("number_of_slips",) if isinstance(self.problem.excitation, Record) else ()
         wanted = ("permanent_displacement", "validity", *slips)
@@ -261,16 +305,22 @@ class Scan:
         self.targets = displacement.set_dims(request.sizes).values.ravel()
         #: Inputs but for the amplitude: one value for each cell, or one for all.
         self.inputs = {
-            name: xr.Variable("cell", one.set_dims(request.sizes).values.ravel()) if one.dims else one
+            name: xr.Variable("cell", one.set_dims(request.sizes).values.ravel())
+            if one.dims
+            else one
             for name, one in inputs.items()
         }
 
-    def solve(self, amplitude: Floats, cell: Indices, wanted: tuple[str, ...]) -> dict[str, NDArray[Any]]:
+    def solve(
+        self, amplitude: Floats, cell: Indices, wanted: tuple[str, ...]
+    ) -> dict[str, NDArray[Any]]:
         """Results of some cells, each at its own amplitudes (rows of the array)."""
         dims = ("cell", _ALONG)[: amplitude.ndim]
         inputs = {name: one[cell] if one.dims else one for name, one in self.inputs.items()}
         inputs["amplitude"] = xr.Variable(dims, amplitude)
-        found = engine.solve(Request(self.problem, dict(zip(dims, amplitude.shape, strict=True)), inputs, wanted))
+        found = engine.solve(
+            Request(self.problem, dict(zip(dims, amplitude.shape, strict=True)), inputs, wanted)
+        )
         return {name: one.values for name, one in found.items()}
 
     def reach(self, amplitude: Floats, cell: Indices) -> NDArray[np.bool_]:
@@ -282,17 +332,20 @@ class Scan:
 def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) -> xr.Variable:
     """Amplitudes to try, with both sides of every change of mode: along a dimension of their own, the last one.
 
-    The other dimensions are those of the grid along which more than the target and the time scale varies.
+    The other dimensions are those of the grid along which more than the target and the time scale
+    varies.
     """
     problem = request.problem
     blocks = {name: one for name, one in request.inputs.items() if name not in _AFTER_SCAN}
     sizes = {dim: size for dim, size in request.sizes.items() if dim in grid_sizes(blocks)}
-    # Newmark's block has no limiting acceleration, and may have no θ and μs that one would follow from
+    # Newmark's block has no limiting acceleration, and may have no θ and μs that one would follow
+    # from
     limited = ("limiting_acceleration",) if not isinstance(problem.model, options.Newmark) else ()
     wanted = ("yield_acceleration", *limited)
     blocks["amplitude"] = xr.Variable((), 0.0)
     found = engine.friction_parameters(Request(problem, sizes, blocks, wanted))
-    # a pulse begins to count, or changes its mode, where its own peak passes Üy or Üg,lim, which do not depend on A
+    # a pulse begins to count, or changes its mode, where its own peak passes Üy or Üg,lim, which do
+    # not depend on A
     thresholds = np.stack([found[name].values.ravel() for name in wanted], axis=1)
     yields = thresholds[:, :1]
     # without a yield acceleration there is no value at any amplitude
@@ -300,13 +353,18 @@ def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) 
     with np.errstate(over="ignore"):
         ratio = np.minimum(maximum_amplitude / start, np.finfo(np.float64).max)
     amplitudes = start * ratio ** np.linspace(0.0, 1.0, steps + 1)
-    amplitudes[:, :1], amplitudes[:, -1] = start, maximum_amplitude
+    amplitudes[:, :1] = start
+    amplitudes[:, -1] = maximum_amplitude
     amplitudes = np.maximum.accumulate(np.minimum(amplitudes, maximum_amplitude), axis=1)
     with np.errstate(over="ignore", invalid="ignore"):
         places = (thresholds[:, :, None] / _heights(request)).reshape(len(thresholds), -1)
         changes = np.hstack([places * (1.0 - 1e-15), places * (1.0 + 1e-15)])  # they are rounded
-    within = np.where((changes >= start) & (changes <= maximum_amplitude), changes, maximum_amplitude)
-    scanned = np.sort(np.hstack([amplitudes, within[:, (within < maximum_amplitude).any(axis=0)]]), axis=1)
+    within = np.where(
+        (changes >= start) & (changes <= maximum_amplitude), changes, maximum_amplitude
+    )
+    scanned = np.sort(
+        np.hstack([amplitudes, within[:, (within < maximum_amplitude).any(axis=0)]]), axis=1
+    )
     return xr.Variable((*sizes, _ALONG), scanned.reshape(*sizes.values(), -1))
 
 
@@ -315,7 +373,9 @@ def _heights(request: Request) -> Floats:
     motion = request.problem.excitation
     if not isinstance(motion, Record):
         return np.ones(1)
-    heights = wave_of_record(motion, float(request.inputs["polarity"].values.item())).height / motion.peak
+    heights = (
+        wave_of_record(motion, float(request.inputs["polarity"].values.item())).height / motion.peak
+    )
     return np.unique(heights)[-128:]
 
 
@@ -326,33 +386,46 @@ def _limits(scan: Scan) -> Steps:
     # the scan begins at yield, where no block has moved: there is always a step before
     before = ~reached[:, :-1]
     cell, step = np.nonzero(before & reached[:, 1:])
-    found = [(cell, scan.amplitudes[cell, step], scan.amplitudes[cell, step + 1]), *_hidden_peaks(scan, before)]
-    # in the gap of the literal rise Kd would be negative: at its edges Kd vanishes, and u grows beyond all bounds
+    found = [
+        (cell, scan.amplitudes[cell, step], scan.amplitudes[cell, step + 1]),
+        *_hidden_peaks(scan, before),
+    ]
+    # in the gap of the literal rise Kd would be negative: at its edges Kd vanishes, and u grows
+    # beyond all bounds
     found.append(_at_change(scan, before, "validity", bits=Validity.KD_NOT_POSITIVE.value))
-    if "number_of_slips" in scan.found:  # where it changes, u jumps; under a waveform such jumps are hidden peaks
+    if (
+        "number_of_slips" in scan.found
+    ):  # where it changes, u jumps; under a waveform such jumps are hidden peaks
         found.append(_at_change(scan, before, "number_of_slips", least=0.25, part=1e-5))
     cells, low, high = (np.concatenate(values) for values in zip(*found, strict=True))
     order = np.argsort(high, kind="stable")
     cell, at = np.unique(cells[order], return_index=True)
     lowest = order[at]
-    return cell, *_bisected(low[lowest], high[lowest], lambda at, which: scan.reach(at, cell[which]))
+    return cell, *_bisected(
+        low[lowest], high[lowest], lambda at, which: scan.reach(at, cell[which])
+    )
 
 
 def _hidden_peaks(scan: Scan, before: NDArray[np.bool_]) -> Iterator[Steps]:
     """Parts of steps in which a target is reached, `before` (cell, step) the scan itself reaches it."""
-    # blocks that do not recouple: u jumps up each time that they come to rest one pulse earlier, and then falls
+    # blocks that do not recouple: u jumps up each time that they come to rest one pulse earlier,
+    # and then falls
     saw, parts = (0.7, 128) if isinstance(scan.problem.excitation, Record) else (0.5, 512)
     moved = scan.found["permanent_displacement"]
     slides_on = scan.found["validity"] & Validity.NOT_RECOUPLED.value != 0
-    # the part of a target from which on a point may lie next to a peak, and a maximum of the scan to a higher one
+    # the part of a target from which on a point may lie next to a peak, and a maximum of the scan
+    # to a higher one
     least = np.where(slides_on, saw, np.inf)
     peaks = (moved[:, 1:-1] > moved[:, :-2]) & (moved[:, 1:-1] > moved[:, 2:])
     least[:, 1:-1][peaks & ~slides_on[:, 1:-1]] = 0.9
     near = moved >= least * scan.targets[:, np.newaxis]
     cell, step = np.nonzero((near[:, 1:] | near[:, :-1]) & before)
     for chunk in grid_chunks({"cell": cell.size}, SCANNED // parts):
-        own, begin = cell[chunk["cell"]], step[chunk["cell"]]
-        amplitudes = np.linspace(scan.amplitudes[own, begin], scan.amplitudes[own, begin + 1], parts + 1, axis=1)
+        own = cell[chunk["cell"]]
+        begin = step[chunk["cell"]]
+        amplitudes = np.linspace(
+            scan.amplitudes[own, begin], scan.amplitudes[own, begin + 1], parts + 1, axis=1
+        )
         reaches = scan.reach(amplitudes, own)
         (which,) = np.nonzero(reaches.any(axis=1) & ~reaches[:, 0])
         first = reaches[which].argmax(axis=1)
@@ -360,19 +433,30 @@ def _hidden_peaks(scan: Scan, before: NDArray[np.bool_]) -> Iterator[Steps]:
 
 
 def _at_change(
-    scan: Scan, before: NDArray[np.bool_], result: str, *, bits: int = -1, least: float = 0.0, part: float = 0.0
+    scan: Scan,
+    before: NDArray[np.bool_],
+    result: str,
+    *,
+    bits: int = -1,
+    least: float = 0.0,
+    part: float = 0.0,
 ) -> Steps:
     """Steps up to the last amplitude before a change of a result, or to the first after it, that reaches a target.
 
-    The place of the change is located, to a `part` of the step, where u on either side of it is `least` of the target.
+    The place of the change is located, to a `part` of the step, where u on either side of it is
+    `least` of the target.
     """
-    moved, states = scan.found["permanent_displacement"], scan.found[result] & bits
+    moved = scan.found["permanent_displacement"]
+    states = scan.found[result] & bits
     cell, step = np.nonzero(states[:, 1:] != states[:, :-1])
     higher = np.maximum(moved[cell, step + 1], moved[cell, step])
     # no comparison holds for the NaN of a gap: its edges are located
     may = before[cell, step] & ~(higher < least * scan.targets[cell])
-    cell, step = cell[may], step[may]
-    start, end, known = scan.amplitudes[cell, step], scan.amplitudes[cell, step + 1], states[cell, step]
+    cell = cell[may]
+    step = step[may]
+    start = scan.amplitudes[cell, step]
+    end = scan.amplitudes[cell, step + 1]
+    known = states[cell, step]
 
     def changed(amplitude: Floats, which: Indices) -> NDArray[np.bool_]:
         there = scan.solve(amplitude, cell[which], (result,))[result] & bits
@@ -385,19 +469,30 @@ def _at_change(
 
 
 def _bisected(
-    low: Floats, high: Floats, changed: Callable[[Floats, Indices], NDArray[np.bool_]], width: Floats | float = 0.0
+    low: Floats,
+    high: Floats,
+    changed: Callable[[Floats, Indices], NDArray[np.bool_]],
+    width: Floats | float = 0.0,
 ) -> tuple[Floats, Floats]:
     """Halve intervals until their ends are neighbours in double precision, or no further apart than `width`.
 
     `changed`, of amplitudes and the indices of their intervals, holds at `high` and not at `low`.
     """
-    low, high = low.copy(), high.copy()
-    active, width = np.arange(low.size), np.broadcast_to(width, low.shape)
+    low = low.copy()
+    high = high.copy()
+    active = np.arange(low.size)
+    width = np.broadcast_to(width, low.shape)
     while True:
         middle = low[active] + 0.5 * (high[active] - low[active])
-        inside = (low[active] < middle) & (middle < high[active]) & (high[active] - low[active] > width[active])
-        active, middle = active[inside], middle[inside]
+        inside = (
+            (low[active] < middle)
+            & (middle < high[active])
+            & (high[active] - low[active] > width[active])
+        )
+        active = active[inside]
+        middle = middle[inside]
         if not active.size:
             return low, high
         above = changed(middle, active)
-        high[active[above]], low[active[~above]] = middle[above], middle[~above]
+        high[active[above]] = middle[above]
+        low[active[~above]] = middle[~above]

@@ -1,13 +1,15 @@
 """What is drawn: distributions of scipy.stats, quasi-random numbers of scipy.stats.qmc, and Sobol indices of the draws.
 
-Sobol indices take two independent sets of draws, A and B, and for each of k inputs a third set: A, but with this input
-from B.  That is k + 2 runs for each sample, of which A has the samples of all other statistics.  With means over the
-samples, and V the variance of A and B, the indices of an input are
+Sobol indices take two independent sets of draws, A and B, and for each of k inputs a third set: A,
+but with this input from B.  That is k + 2 runs for each sample, of which A has the samples of all
+other statistics.  With means over the samples, and V the variance of A and B, the indices of an
+input are
 
     first order   mean(u_B (u_AB − u_A)) / V          total   mean((u_A − u_AB)²) / (2 V)
 
-(Saltelli et al. 2010, doi:10.1016/j.cpc.2009.09.018, Table 2, b and f).  `scipy.stats.sobol_indices` has the same
-estimators, but its bootstrap takes no seed, so that a run could not be repeated.
+(Saltelli et al. 2010, doi:10.1016/j.cpc.2009.09.018, Table 2, b and f).
+`scipy.stats.sobol_indices` has the same estimators, but its bootstrap takes no seed, so that a run
+could not be repeated.
 """
 
 import functools
@@ -21,7 +23,14 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.model import parameters
-from slipsweep.model.parameters import check_choice, check_finite, check_list, check_whole, number_text, shown
+from slipsweep.model.parameters import (
+    check_choice,
+    check_finite,
+    check_list,
+    check_whole,
+    number_text,
+    shown,
+)
 from slipsweep.model.units import conversion, quantity
 from slipsweep.model.variables import DRAWN, PARAMETERS, SensitivityStatus
 
@@ -33,7 +42,8 @@ Thresholds = float | str | Sequence[float | str] | np.ndarray
 #: Most samples a grid point: 2**24 take about 1.5 GB.
 MOST_SAMPLES = 2**24
 
-#: Half of the last digit of scipy's Sobol numbers, some of which are 0: the quantile there may be infinite.
+#: Half of the last digit of scipy's Sobol numbers, some of which are 0: the quantile there may be
+#: infinite.
 _LEAST = 2.0**-31
 
 #: Resamples of the bootstrap, and the shares of them below the ends of an interval.
@@ -56,8 +66,11 @@ class Distribution:
         entries = dict(given) if isinstance(given, Mapping) else {"distribution": given}
         chosen = entries.pop("distribution", None)
         #: Whether a draw is the value ("absolute"), multiplies the grid point's, or is added to it.
-        self.kind = check_choice(f"{key}.kind", entries.pop("kind", "absolute"), ("absolute", "factor", "offset"))
-        units, own = entries.pop("units", None), PARAMETERS[parameter]["units"]
+        self.kind = check_choice(
+            f"{key}.kind", entries.pop("kind", "absolute"), ("absolute", "factor", "offset")
+        )
+        units = entries.pop("units", None)
+        own = PARAMETERS[parameter]["units"]
         if units is not None and (self.kind == "factor" or not isinstance(units, str)):
             raise InputError(
                 f"{key}.units = {shown(units)}: not allowed with kind = 'factor', else a unit that converts to {own}"
@@ -77,7 +90,9 @@ class Distribution:
                     f"{key}: has {', '.join(map(str, entries)) or 'no parameters'}: {chosen} takes "
                     f"{', '.join(allowed)}, of which loc and scale may be left out (and the keys kind and units)"
                 )
-            self.frozen = family(**{name: check_finite(f"{key}.{name}", value) for name, value in entries.items()})
+            self.frozen = family(
+                **{name: check_finite(f"{key}.{name}", value) for name, value in entries.items()}
+            )
         elif entries or not callable(getattr(chosen, "ppf", None)):
             raise InputError(
                 f"{key}.distribution = {shown(chosen)}: must be the name of a distribution of scipy.stats, with its "
@@ -86,18 +101,31 @@ class Distribution:
         #: The distribution in words and numbers, as it was given.
         self.about: dict[str, Any] = {"distribution": repr(self.frozen)}
         if family := getattr(self.frozen, "dist", None):
-            numbers = dict(zip(_arguments(family), self.frozen.args, strict=False)) | self.frozen.kwds
-            self.about = {"distribution": family.name, **{name: float(value) for name, value in numbers.items()}}
+            numbers = (
+                dict(zip(_arguments(family), self.frozen.args, strict=False)) | self.frozen.kwds
+            )
+            self.about = {
+                "distribution": family.name,
+                **{name: float(value) for name, value in numbers.items()},
+            }
         with np.errstate(all="ignore"):
             median = parameters.check_numbers(f"{key}: its median", self.frozen.ppf(0.5))
         if median.ndim or not np.isfinite(median):
-            raise InputError(f"{key}: parameters that scipy.stats does not allow for one distribution: {self.about}")
+            raise InputError(
+                f"{key}: parameters that scipy.stats does not allow for one distribution: {self.about}"
+            )
         #: What to multiply draws by, to have them in the parameter's own unit.
         self.unit = conversion(f"{key}.units", own, units, g)
-        self.about |= {"units": units, "kind": self.kind} if units is not None else {"kind": self.kind}
+        self.about |= (
+            {"units": units, "kind": self.kind} if units is not None else {"kind": self.kind}
+        )
 
     def __str__(self) -> str:
-        numbers = [f"{name}={value}" for name, value in self.about.items() if name not in ("distribution", "kind")]
+        numbers = [
+            f"{name}={value}"
+            for name, value in self.about.items()
+            if name not in ("distribution", "kind")
+        ]
         return f"{self.about['distribution']}({', '.join(numbers)})"
 
     def draws(self, uniform: Floats) -> Floats:
@@ -116,8 +144,8 @@ class Distribution:
 class Sampling:
     """How inputs are sampled and which statistics are wanted: the arguments of `slipsweep.sample`, checked.
 
-    "g" as a unit of acceleration is `g` m/s²; `keys` stands before the names of options in errors.  InputError: the
-    first thing that is not allowed.
+    "g" as a unit of acceleration is `g` m/s²; `keys` stands before the names of options in errors.
+    InputError: the first thing that is not allowed.
     """
 
     def __init__(
@@ -143,10 +171,14 @@ class Sampling:
             raise InputError(f"{self.key('').removesuffix('.')}: {known}")
         for name in uncertain:
             if name not in DRAWN:
-                raise InputError(f"{self.key(name)}: cannot be drawn; {did_you_mean(str(name), DRAWN)}")
+                raise InputError(
+                    f"{self.key(name)}: cannot be drawn; {did_you_mean(str(name), DRAWN)}"
+                )
         # in one order, whatever that of the caller: the draws are then the same
         names = [name for name in DRAWN if name in uncertain]
-        self.distributions = {name: Distribution(self.key(name), name, uncertain[name], g) for name in names}
+        self.distributions = {
+            name: Distribution(self.key(name), name, uncertain[name], g) for name in names
+        }
         self.method = check_choice(f"{keys}method", method, ("sobol", "latin_hypercube", "random"))
         self.samples = check_whole(f"{keys}samples", samples, 2, MOST_SAMPLES)
         if method == "sobol" and self.samples & (self.samples - 1):
@@ -160,7 +192,9 @@ class Sampling:
         self.sensitivity = bool(sensitivity)
         pooled = [over] if isinstance(over, str) else check_list(f"{keys}over", over, "dimensions")
         if pooled and sensitivity:
-            raise InputError(f"{keys}sensitivity = true: not allowed with {keys}over: indices are of drawn inputs only")
+            raise InputError(
+                f"{keys}sensitivity = true: not allowed with {keys}over: indices are of drawn inputs only"
+            )
         self.over = tuple(map(str, pooled))
         self.seed = check_whole(f"{keys}seed", seed, 0, 2**31 - 1)  # attributes hold 32 bits
         self.quantiles = check_increasing(f"{keys}quantiles", quantiles, "quantile")
@@ -172,7 +206,9 @@ class Sampling:
             i, j = map(names.index, pair)
             self.matrix[i, j] = self.matrix[j, i] = value
         if np.linalg.eigvalsh(self.matrix).min() < 1e-12:
-            raise InputError(f"{keys}correlation: no such correlations exist together (their matrix is not positive)")
+            raise InputError(
+                f"{keys}correlation: no such correlations exist together (their matrix is not positive)"
+            )
         number, group = connected_components(self.matrix, directed=False)
         #: The parameters, those that are correlated with one another together.
         self.independent = tuple(tuple(np.array(names)[group == k].tolist()) for k in range(number))
@@ -191,7 +227,8 @@ class Sampling:
         """Draws of each parameter for all runs: A; for Sobol indices also B, and A with each input from B."""
         from scipy.stats import norm, qmc
 
-        sets, number = 2 if self.sensitivity else 1, len(self.distributions)
+        sets = 2 if self.sensitivity else 1
+        number = len(self.distributions)
         # a generator of its own: the numbers depend only on the seed
         generator = np.random.default_rng(self.seed)
         if self.method == "random":
@@ -206,7 +243,11 @@ class Sampling:
         drawn = {}
         for at, (name, one) in enumerate(self.distributions.items()):
             first, *others = (one.draws(row) for row in uniform[:, at])
-            mixed = [second if name in group else first for second in others for group in self.independent]
+            mixed = [
+                second if name in group else first
+                for second in others
+                for group in self.independent
+            ]
             drawn[name] = np.concatenate([first, *others, *mixed])
         return drawn
 
@@ -214,12 +255,16 @@ class Sampling:
         """Refuse draws that no physics allows, anywhere on a grid of these coordinates."""
         for name, one in self.distributions.items():
             bound = parameters.BOUNDS[name]
-            # each draw's value is monotone in what it is applied to: the ends of the axis are its extremes.  A factor
-            # on an estimate is checked by itself: the failure of the estimate is a flag of the result
+            # each draw's value is monotone in what it is applied to: the ends of the axis are its
+            # extremes.  A factor on an estimate is checked by itself: the failure of the estimate
+            # is a flag of the result
             bases = [1.0 if one.kind == "factor" else 0.0]
             if name in coords:
                 bases = [float(coords[name].values.min()), float(coords[name].values.max())]
-            outside, base = max((float(np.mean(~bound.holds(one.applied(at, self.draws[name])))), at) for at in bases)
+            outside, base = max(
+                (float(np.mean(~bound.holds(one.applied(at, self.draws[name])))), at)
+                for at in bases
+            )
             if outside:
                 about = f" as {one.kind} on {name} = {base:.6g}" if name in coords else ""
                 raise InputError(
@@ -241,7 +286,9 @@ class Sampling:
         if self.correlation:
             found["correlation"] = json.dumps(self.correlation)
         if self.sensitivity:
-            found["sensitivity"] = f"Saltelli et al. (2010), {self.runs} runs; bootstrap of {RESAMPLES}"
+            found["sensitivity"] = (
+                f"Saltelli et al. (2010), {self.runs} runs; bootstrap of {RESAMPLES}"
+            )
         return found
 
 
@@ -276,7 +323,8 @@ def _pairs(key: str, given: Any, known: Sequence[str]) -> tuple[tuple[str, str, 
         if len(one) != 3:
             raise InputError(f'{key} = {shown(entry)}: must be ["NAME", "OTHER", NUMBER]')
         first, second = (check_choice(key, name, known) for name in one[:2])
-        value, pair = check_finite(key, one[2]), frozenset((first, second))
+        value = check_finite(key, one[2])
+        pair = frozenset((first, second))
         if len(pair) < 2 or pair in pairs or not -1.0 < value < 1.0:
             what = "two parameters, each pair once, and a number between -1 and 1"
             raise InputError(f"{key} = {shown(entry)}: must be {what}")
@@ -287,7 +335,8 @@ def _pairs(key: str, given: Any, known: Sequence[str]) -> tuple[tuple[str, str, 
 def sobol_indices(sampling: Sampling, displacement: Floats) -> dict[str, NDArray[Any]]:
     """Sobol indices, their intervals and their status, from displacements (point, run) of the runs of `Sampling.draws`.
 
-    The first dimension is that of the grid points.  They do not depend on the frequency, as u = W/ω².
+    The first dimension is that of the grid points.  They do not depend on the frequency, as u =
+    W/ω².
     """
     runs = displacement.reshape(-1, len(sampling.independent) + 2, sampling.samples)
     status, values = zip(*(_of_point(one, sampling.seed) for one in runs), strict=True)
@@ -300,7 +349,8 @@ def sobol_indices(sampling: Sampling, displacement: Floats) -> dict[str, NDArray
 
 def _of_point(runs: Floats, seed: int) -> tuple[SensitivityStatus, Floats]:
     """The status of one grid point, its indices (kind, input), and the ends of their intervals."""
-    inputs, samples = runs.shape[0] - 2, runs.shape[1]
+    inputs = runs.shape[0] - 2
+    samples = runs.shape[1]
     largest = np.abs(runs).max()
     none = np.full((3, 2, inputs), np.nan)
     if np.isnan(largest):
@@ -309,14 +359,23 @@ def _of_point(runs: Floats, seed: int) -> tuple[SensitivityStatus, Floats]:
         return SensitivityStatus.NO_VARIANCE, none
     scaled = runs / largest  # squares of no displacement are then too large or too small
     a, b, *mixed = scaled - scaled[:2].mean()
-    terms = np.stack([a + b, a**2 + b**2, *(b * (ab - a) for ab in mixed), *(0.5 * (a - ab) ** 2 for ab in mixed)])
+    terms = np.stack(
+        [
+            a + b,
+            a**2 + b**2,
+            *(b * (ab - a) for ab in mixed),
+            *(0.5 * (a - ab) ** 2 for ab in mixed),
+        ]
+    )
     starts = np.arange(0, samples, -(-samples // _PARTS))
     weights = _resamples(starts.size, seed)
     counts = np.diff(starts, append=samples) @ weights
     resampled = _ratios(np.add.reduceat(terms, starts, axis=-1) @ weights, counts)
     # a resample may have no variance
     ends = np.nanquantile(resampled, ENDS, axis=-1)
-    return SensitivityStatus.COMPUTED, np.concatenate([_ratios(terms.sum(axis=-1), samples)[None], ends])
+    return SensitivityStatus.COMPUTED, np.concatenate(
+        [_ratios(terms.sum(axis=-1), samples)[None], ends]
+    )
 
 
 def _ratios(sums: Floats, count: Any) -> Floats:

@@ -11,7 +11,13 @@ import xarray as xr
 from slipsweep.errors import InputError
 from slipsweep.grid.resources import grid_text
 from slipsweep.model.parameters import check_list, number_text, shown
-from slipsweep.model.variables import STATISTIC_COORDINATES, SUITE_STATISTICS, VALUELESS, LimitStatus, Validity
+from slipsweep.model.variables import (
+    STATISTIC_COORDINATES,
+    SUITE_STATISTICS,
+    VALUELESS,
+    LimitStatus,
+    Validity,
+)
 from slipsweep.studies.sampling import Thresholds, check_increasing, check_thresholds
 
 TITLE = "Statistics of the permanent displacement over a suite of motions"
@@ -65,12 +71,14 @@ def suite_statistics(
         - `displacement_quantile` (m), dimension `quantile`, and `exceedance_probability`, dimension `threshold` (m):
           of all displacements, those that are zero, too.
 
-        All but the counts and `valueless_share` are of the motions that have a value, NaN where none has.
+        All but the counts and `valueless_share` are of the motions that have a value, NaN where
+        none has.
 
     Raises
     ------
     InputError
-        The result has no dimension `motion`, lacks `permanent_displacement` or `validity`, or a value is not allowed.
+        The result has no dimension `motion`, lacks `permanent_displacement` or `validity`, or a
+        value is not allowed.
 
     See Also
     --------
@@ -97,8 +105,10 @@ def suite_statistics(
     for name in ("permanent_displacement", "validity"):
         if name not in result.data_vars:
             raise InputError(f"result: {name}: missing: must be there, of all motions")
-    dims, g = suite_dims(result["permanent_displacement"], over), float(result.attrs.get("g", np.nan))
-    limits, wanted = check_thresholds("thresholds", thresholds, g), check_increasing("quantiles", quantiles, "quantile")
+    dims = suite_dims(result["permanent_displacement"], over)
+    g = float(result.attrs.get("g", np.nan))
+    limits = check_thresholds("thresholds", thresholds, g)
+    wanted = check_increasing("quantiles", quantiles, "quantile")
     least, *others = check_thresholds("zero", zero, g)
     if others:
         raise InputError(f"zero = {shown(zero)}: must be one displacement")
@@ -106,9 +116,12 @@ def suite_statistics(
     moved = without_rounding(result["permanent_displacement"].astype(np.float64).load())
     # a reader may have made codes to numbers with NaN
     codes = result["validity"].fillna(0).astype(np.int16).load()
-    there, total = moved.notnull(), int(np.prod([moved.sizes[dim] for dim in dims]))
+    there = moved.notnull()
+    total = int(np.prod([moved.sizes[dim] for dim in dims]))
     places = {"flag": np.array(REASONS, np.int16), "threshold": limits, "quantile": wanted}
-    own = {dim: xr.Variable(dim, values, STATISTIC_COORDINATES[dim]) for dim, values in places.items()}
+    own = {
+        dim: xr.Variable(dim, values, STATISTIC_COORDINATES[dim]) for dim, values in places.items()
+    }
     meanings = " ".join((flag.name or "").lower() for flag in REASONS)
     own["flag"].attrs |= {"flag_values": [*map(int, REASONS)], "flag_meanings": meanings}
     count = there.sum(dims)
@@ -126,11 +139,20 @@ def suite_statistics(
         "displacement_quantile": _quantiles(moved, wanted, dims),
         "exceedance_probability": (moved > own["threshold"]).where(there).mean(dims),
     }
-    attrs = {**result.attrs, "title": TITLE, "suite_dimensions": " ".join(dims), "zero_displacement": float(least)}
+    attrs = {
+        **result.attrs,
+        "title": TITLE,
+        "suite_dimensions": " ".join(dims),
+        "zero_displacement": float(least),
+    }
     grid = [dim for dim in moved.dims if dim not in dims]
     laid = {name: one.transpose(*grid, ...) for name, one in found.items()}
     variables = {name: (one.dims, one.values, SUITE_STATISTICS[name]) for name, one in laid.items()}
-    coords = {name: one.variable for name, one in result.coords.items() if not {*dims, *own} & {*one.dims, name}}
+    coords = {
+        name: one.variable
+        for name, one in result.coords.items()
+        if not {*dims, *own} & {*one.dims, name}
+    }
     return xr.Dataset(variables, coords | own, attrs)
 
 
@@ -152,13 +174,19 @@ def suite_dims(values: xr.DataArray, over: Any = None) -> tuple[str, ...]:
     """The dimensions that make up the suite: those in `over`, or `SUITE`; InputError: `motion` is not among them."""
     there = tuple(map(str, values.dims))
     if "motion" not in there:
-        raise InputError(f"result: dimensions {', '.join(there) or 'none'}: must have motion, or be of [uncertainty]")
+        raise InputError(
+            f"result: dimensions {', '.join(there) or 'none'}: must have motion, or be of [uncertainty]"
+        )
     if over is None:
         return tuple(dim for dim in SUITE if dim in there)
-    dims: Sequence[Any] = [over] if isinstance(over, str) else check_list("over", over, "dimensions")
+    dims: Sequence[Any] = (
+        [over] if isinstance(over, str) else check_list("over", over, "dimensions")
+    )
     for dim in dims:
         if dim not in there:
-            raise InputError(f"over = {shown(dim)}: must be a dimension of the result: {', '.join(there)}")
+            raise InputError(
+                f"over = {shown(dim)}: must be a dimension of the result: {', '.join(there)}"
+            )
     if "motion" not in dims:
         raise InputError(f"over = {shown(over)}: must have motion among them")
     return tuple(dict.fromkeys(dims))
@@ -167,24 +195,30 @@ def suite_dims(values: xr.DataArray, over: Any = None) -> tuple[str, ...]:
 def limit_quantiles(limits: xr.Dataset) -> xr.Dataset:
     """`QUANTILES` of the limit amplitudes of a suite's motions, at every other grid point: `limit_amplitude`'s result.
 
-    A motion that does not reach the displacement has a limit above all others, and is of `not_reached_count`: a
-    `limit_quantile` (m/s²) is infinite where too many do not.  Those without a value are left out of it.
+    A motion that does not reach the displacement has a limit above all others, and is of
+    `not_reached_count`: a `limit_quantile` (m/s²) is infinite where too many do not.  Those without
+    a value are left out of it.
     """
     dims = suite_dims(limits["limit_amplitude"])
     beyond = limits["limit_status"] == LimitStatus.NOT_REACHED
     # so large that whatever is interpolated towards it is above all limits
     values = limits["limit_amplitude"].where(~beyond, np.finfo(np.float64).max / 4.0)
     found = _quantiles(values, np.array(QUANTILES), dims)
-    quantile = found.where(~(found > values.where(~beyond).max()), np.inf).assign_attrs(units="m s-2")
+    quantile = found.where(~(found > values.where(~beyond).max()), np.inf).assign_attrs(
+        units="m s-2"
+    )
     counts = {"value_count": values.count(dims), "not_reached_count": beyond.sum(dims)}
-    return xr.Dataset({"limit_quantile": quantile, **counts}, {"quantile": [*QUANTILES]}, limits.attrs)
+    return xr.Dataset(
+        {"limit_quantile": quantile, **counts}, {"quantile": [*QUANTILES]}, limits.attrs
+    )
 
 
 def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100) -> list[str]:
     """What a designer asks first of a suite, a line for each grid point: median, 16 and 84 %, share of zeros, P(u > d).
 
-    `result` is one of `sweep` with the dimension `motion`, or of `sample`, whose lines are without the share of zeros,
-    and displacements d among its thresholds.  Of more grid points than `most` there is one line: how to have some.
+    `result` is one of `sweep` with the dimension `motion`, or of `sample`, whose lines are without
+    the share of zeros, and displacements d among its thresholds.  Of more grid points than `most`
+    there is one line: how to have some.
     """
     import pandas as pd
 
@@ -193,21 +227,27 @@ def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100)
     dims = ("quantile",) if is_sampled else suite_dims(moved)
     grid = {dim: size for dim, size in moved.sizes.items() if dim not in dims}
     points = math.prod(grid.values())
-    drawn = f"{result.attrs.get('pooled', '')} x {result.attrs.get('samples', '')} samples".removeprefix(" x ")
+    drawn = f"{result.attrs.get('pooled', '')} x {result.attrs.get('samples', '')} samples".removeprefix(
+        " x "
+    )
     suite = drawn if is_sampled else grid_text({dim: moved.sizes[dim] for dim in dims})
     if points > most:
         how = "slipsweep info OUT.nc --at NAME=VALUE -d 50mm"
         return [f"statistics over {suite} at {points} grid points: {how} prints those of some"]
     if is_sampled:
         missing = result["valueless_share"].broadcast_like(moved.isel(quantile=0, drop=True))
-        found = result[["displacement_quantile", "exceedance_probability"]].assign(valueless_share=missing)
+        found = result[["displacement_quantile", "exceedance_probability"]].assign(
+            valueless_share=missing
+        )
         found = at_thresholds(found, displacement).transpose(*grid, ...).load()
     else:
         found = suite_statistics(result, thresholds=0.0 if displacement is None else displacement)
     varying = [dim for dim, size in grid.items() if size > 1]
     # peak ground accelerations in g
     factors = {"amplitude": 1.0 / float(found.attrs.get("g", np.nan))}
-    labels = itertools.product(*(labels_along(found, dim, factors.get(str(dim), 1.0)) for dim in varying))
+    labels = itertools.product(
+        *(labels_along(found, dim, factors.get(str(dim), 1.0)) for dim in varying)
+    )
     columns: dict[str, Sequence[str]] = {}
     for dim, texts in zip(varying, zip(*labels, strict=True), strict=True):
         units = found[dim].attrs.get("units", "1") if dim in found.variables else "1"
@@ -223,11 +263,16 @@ def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100)
     if not is_sampled:
         show("zero", rows["zero_probability"][0], ".1%")
     if displacement is not None or is_sampled:
-        for d, column in zip(found["threshold"].values, rows["exceedance_probability"], strict=True):
+        for d, column in zip(
+            found["threshold"].values, rows["exceedance_probability"], strict=True
+        ):
             show(f"P(u > {d * 1000.0:.6g} mm)", column, ".1%")
     if (rows["valueless_share"] > 0.0).any():
         show("no value", rows["valueless_share"][0], ".1%")
-    return [f"permanent displacement (mm) over {suite}:", *pd.DataFrame(columns).to_string(index=False).splitlines()]
+    return [
+        f"permanent displacement (mm) over {suite}:",
+        *pd.DataFrame(columns).to_string(index=False).splitlines(),
+    ]
 
 
 def at_thresholds(found: xr.Dataset, thresholds: Thresholds | None) -> xr.Dataset:
@@ -247,7 +292,9 @@ def at_thresholds(found: xr.Dataset, thresholds: Thresholds | None) -> xr.Datase
 
 def labels_along(data: xr.Dataset, dim: Hashable, factor: float = 1.0) -> list[str]:
     """What the places along a dimension are called: its labels, its numbers times a factor, or 1, 2, ..."""
-    name = next((one for one in (dim, "label") if one in data.variables and data[one].dims == (dim,)), None)
+    name = next(
+        (one for one in (dim, "label") if one in data.variables and data[one].dims == (dim,)), None
+    )
     values = np.arange(1, data.sizes[dim] + 1) if name is None else data[name].values
     return [str(one) if values.dtype.kind not in "iuf" else f"{one * factor:.4g}" for one in values]
 

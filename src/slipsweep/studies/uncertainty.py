@@ -1,8 +1,9 @@
 """Uncertain inputs: samples of a sweep's parameters, and the statistics of the displacement at every grid point.
 
-Parameters are drawn once (`sampling`), and the same draws serve every grid point: curves over an axis are then as
-smooth as the model, and differences between grid points are not blurred by sampling.  u = W/ω²: where the samples do
-not depend on the frequency (under a record 1 / time scale) they are solved once for all frequencies.
+Parameters are drawn once (`sampling`), and the same draws serve every grid point: curves over an
+axis are then as smooth as the model, and differences between grid points are not blurred by
+sampling.  u = W/ω²: where the samples do not depend on the frequency (under a record 1 / time
+scale) they are solved once for all frequencies.
 """
 
 import math
@@ -47,7 +48,8 @@ _BY_FREQUENCY = ("displacement_quantile", "mean_displacement", "exceedance_proba
 
 _MODES = tuple(mode for mode in variables.SlidingMode if mode is not variables.SlidingMode.MISSING)
 
-#: Parameters that have an estimate where they are not given, in the order in which each needs those before it.
+#: Parameters that have an estimate where they are not given, in the order in which each needs those
+#: before it.
 _ESTIMATED = ("yield_acceleration", "minimum_friction", "delta_mu", "decay_rate")
 
 #: Names that no dimension and no coordinate of a caller's may have.
@@ -93,20 +95,23 @@ def sample(
 ) -> xr.Dataset:
     """Quantiles and exceedance probabilities of the permanent displacement under uncertain inputs.
 
-    Parameters span a grid as in `sweep`; at every grid point those in `uncertain` are drawn, with the same draws.
+    Parameters span a grid as in `sweep`; at every grid point those in `uncertain` are drawn, with
+    the same draws.
 
     Parameters
     ----------
     theta, mu_s, amplitude, frequency : float, array or DataArray
-        These and all parameters not named here as in `sweep`.  One drawn with ``kind="absolute"`` must not be given.
+        These and all parameters not named here as in `sweep`.  One drawn with ``kind="absolute"``
+        must not be given.
     uncertain : mapping of str to mapping or frozen distribution
-        For any parameter but `polarity` and `azimuth` either a frozen distribution of scipy.stats, or a mapping with
+        For any parameter but `polarity` and `azimuth` either a frozen distribution of scipy.stats,
+        or a mapping with
 
         - ``distribution``: the name of a continuous distribution of scipy.stats (or a frozen one),
           whose shape parameters, ``loc`` and ``scale`` are further keys;
         - ``kind``: "absolute" (a draw is the value; by default), "factor" (it multiplies the value at the grid point
-          or, for `yield_acceleration`, and without a record for `decay_rate`, `delta_mu` and `minimum_friction`, the
-          estimate) or "offset" (it is added to it);
+          or, for `yield_acceleration`, and without a record for `decay_rate`, `delta_mu` and
+          `minimum_friction`, the estimate) or "offset" (it is added to it);
         - ``units``: of the draws, if not the parameter's own; not with factors.
     samples : int
         Samples a grid point; a power of 2 for Sobol's.
@@ -115,16 +120,18 @@ def sample(
     seed : int
         The same seed gives the same draws.
     quantiles, thresholds : float, str or list of these
-        Increasing, as in `suite_statistics`: shares, and displacements in m or with a unit ("50mm").
+        Increasing, as in `suite_statistics`: shares, and displacements in m or with a unit
+        ("50mm").
     correlation : list of (str, str, float)
         Pairs of drawn parameters and the correlation of their normal scores (a Gaussian copula).
     sensitivity : bool
-        Compute Sobol indices [1]_ of the displacement, too: from ``samples * (k + 2)`` runs a grid point, of k inputs,
-        the samples among them.
+        Compute Sobol indices [1]_ of the displacement, too: from ``samples * (k + 2)`` runs a grid
+        point, of k inputs, the samples among them.
     over : str or list of str
-        Dimensions of the grid, such as ``["motion", "polarity"]`` of a suite, whose values are equally likely draws:
-        each meets all samples, and statistics are over all of them together; by default each motion has its own.  Not
-        with `sensitivity`, nor a dimension of `frequency` or `time_scale`.
+        Dimensions of the grid, such as ``["motion", "polarity"]`` of a suite, whose values are
+        equally likely draws: each meets all samples, and statistics are over all of them together;
+        by default each motion has its own.  Not with `sensitivity`, nor a dimension of `frequency`
+        or `time_scale`.
     progress : callable, optional
         Called with the number of samples just solved, from any thread.
 
@@ -134,16 +141,19 @@ def sample(
         Over the grid:
 
         - `displacement_quantile` (m), dimension `quantile`, `mean_displacement` (m) and `exceedance_probability`,
-          dimension `threshold` (m): P(u > threshold).  They are of the samples that have a value; NaN where none has.
-          Statically unstable samples have no value, and are counted as exceeding every threshold.
+          dimension `threshold` (m): P(u > threshold).  They are of the samples that have a value;
+          NaN where none has. Statically unstable samples have no value, and are counted as
+          exceeding every threshold.
         - `mode_share` (not under a record), dimension `mode`, `flag_share`, dimension `flag`, and `valueless_share`: of
-          all samples, how many slide in which mode, have which flag, and have no value.  They do not depend on the
-          frequency (of a record: the time scale) and have no such dimension (but with `displacement_amplitude`).
+          all samples, how many slide in which mode, have which flag, and have no value.  They do
+          not depend on the frequency (of a record: the time scale) and have no such dimension (but
+          with `displacement_amplitude`).
         - with `sensitivity`, `first_order_index` and `total_index`, dimension `input`: the part of the variance of the
-          displacement that an input makes by itself, and with all that depends on it; their 95 % intervals by a
-          bootstrap, `first_order_interval` and `total_interval`, dimension `bound`.  They lack the frequency as shares
-          do.  Inputs that are correlated count as one, named as in "decay_rate+delta_mu".  There are none (NaN) where
-          `sensitivity_status` is 1 (all runs have the same displacement) or 2 (a run has no value).
+          displacement that an input makes by itself, and with all that depends on it; their 95 %
+          intervals by a bootstrap, `first_order_interval` and `total_interval`, dimension `bound`.
+          They lack the frequency as shares do.  Inputs that are correlated count as one, named as
+          in "decay_rate+delta_mu".  There are none (NaN) where `sensitivity_status` is 1 (all runs
+          have the same displacement) or 2 (a run has no value).
 
     Raises
     ------
@@ -173,16 +183,36 @@ def sample(
     array([0.   , 0.265])
     """
     inputs = grid_inputs.Inputs(
-        theta=theta, mu_s=mu_s, phi=phi, amplitude=amplitude, frequency=frequency,
-        displacement_amplitude=displacement_amplitude, scale=scale, pgv=pgv, arias_intensity=arias_intensity,
-        time_scale=time_scale, polarity=polarity, azimuth=azimuth, yield_acceleration=yield_acceleration,
-        yield_coefficient=yield_coefficient, decay_rate=decay_rate, delta_mu=delta_mu,
+        theta=theta,
+        mu_s=mu_s,
+        phi=phi,
+        amplitude=amplitude,
+        frequency=frequency,
+        displacement_amplitude=displacement_amplitude,
+        scale=scale,
+        pgv=pgv,
+        arias_intensity=arias_intensity,
+        time_scale=time_scale,
+        polarity=polarity,
+        azimuth=azimuth,
+        yield_acceleration=yield_acceleration,
+        yield_coefficient=yield_coefficient,
+        decay_rate=decay_rate,
+        delta_mu=delta_mu,
         minimum_friction=minimum_friction,
-    )  # fmt: skip
+    )
     sampling = Sampling(
-        uncertain, samples=samples, method=method, seed=seed, quantiles=quantiles, thresholds=thresholds,
-        correlation=correlation, sensitivity=sensitivity, over=over, g=options.MODELS.of(model).g,
-    )  # fmt: skip
+        uncertain,
+        samples=samples,
+        method=method,
+        seed=seed,
+        quantiles=quantiles,
+        thresholds=thresholds,
+        correlation=correlation,
+        sensitivity=sensitivity,
+        over=over,
+        g=options.MODELS.of(model).g,
+    )
     plan = plan_samples(sampling, inputs, excitation=excitation, model=model, solver=solver)
     coords = datasets.brought_coordinates(inputs, plan.coords, _TAKEN)
     return plan.solve(progress).assign_coords(coords).drop_dims(sampling.over, errors="ignore")
@@ -197,14 +227,22 @@ def plan_samples(
     drawn = sampling.distributions
     absolute = [name for name, one in drawn.items() if one.kind == "absolute"]
     # 0.5: a value that every parameter may have
-    planned, wanted = replace(inputs, **dict.fromkeys(absolute, 0.5)), ["permanent_displacement"]
-    plan = plans.plan_sweep(planned, excitation=excitation, model=model, solver=solver, variables=wanted)
+    planned = replace(inputs, **dict.fromkeys(absolute, 0.5))
+    wanted = ["permanent_displacement"]
+    plan = plans.plan_sweep(
+        planned, excitation=excitation, model=model, solver=solver, variables=wanted
+    )
     dropped = {*absolute, *(["mu_s"] if "phi" in drawn else [])}
-    if "displacement_amplitude" in plan.coords and {"displacement_amplitude", "frequency"} & dropped:
+    if (
+        "displacement_amplitude" in plan.coords
+        and {"displacement_amplitude", "frequency"} & dropped
+    ):
         dropped.add("amplitude")  # A = ω²d of no value is nobody's amplitude
     coords = {name: variable for name, variable in plan.coords.items() if name not in dropped}
     sampling.check_draws(coords)
-    about = options.friction_inputs(problem.model.name, coords, {name: one.kind for name, one in drawn.items()})
+    about = options.friction_inputs(
+        problem.model.name, coords, {name: one.kind for name, one in drawn.items()}
+    )
     attrs = {**plan.attrs, "title": TITLE, "friction_inputs": about, **sampling.attributes}
     return SamplePlan(sampling, problem, coords, attrs)
 
@@ -219,7 +257,8 @@ def _check_drawn(sampling: Sampling, given: Sequence[str], problem: grid_inputs.
     kinds = (variables.WAVEFORM_INPUTS, variables.RECORD_INPUTS)
     foreign = {*kinds[not recorded]} - {*kinds[recorded]}
     for name, one in sampling.distributions.items():
-        key, friction_law = sampling.key(name), name in ("decay_rate", "delta_mu", "minimum_friction")
+        key = sampling.key(name)
+        friction_law = name in ("decay_rate", "delta_mu", "minimum_friction")
         if name in foreign:
             raise InputError(f"{key}: not allowed with {'a Record' if recorded else 'a waveform'}")
         if friction_law and isinstance(problem.model, options.Newmark):
@@ -234,7 +273,9 @@ def _check_drawn(sampling: Sampling, given: Sequence[str], problem: grid_inputs.
         if name == "yield_acceleration":
             estimated = "yield_coefficient" not in {*given, *sampling.distributions}
         if one.kind != "absolute" and name not in given and not estimated:
-            raise InputError(f'{key}: kind = "{one.kind}" needs {name} given, to which it is relative')
+            raise InputError(
+                f'{key}: kind = "{one.kind}" needs {name} given, to which it is relative'
+            )
 
 
 class SamplePlan(plans.Plan):
@@ -244,10 +285,17 @@ class SamplePlan(plans.Plan):
     """
 
     def __init__(
-        self, sampling: Sampling, problem: grid_inputs.Problem, coords: dict[str, xr.Variable], attrs: dict[str, Any]
+        self,
+        sampling: Sampling,
+        problem: grid_inputs.Problem,
+        coords: dict[str, xr.Variable],
+        attrs: dict[str, Any],
     ) -> None:
-        self.sampling, self.problem, self.coords = sampling, problem, coords
-        is_wave, drawn = isinstance(problem.excitation, Waveform), sampling.distributions
+        self.sampling = sampling
+        self.problem = problem
+        self.coords = coords
+        is_wave = isinstance(problem.excitation, Waveform)
+        drawn = sampling.distributions
         #: Results, and their dimensions in addition to those of the grid.
         self.results = STATISTICS | (SENSITIVITY if sampling.sensitivity else {})
         if not is_wave:
@@ -264,26 +312,36 @@ class SamplePlan(plans.Plan):
         for dim in sampling.over:
             key = f"{sampling.keys}over = {parameters.shown(dim)}"
             if dim not in sizes:
-                raise InputError(f"{key}: must be a dimension of the grid: {', '.join(sizes) or 'there is none'}")
-            if clock in coords and dim in coords[clock].dims:  # the samples of a grid point serve all its frequencies
+                raise InputError(
+                    f"{key}: must be a dimension of the grid: {', '.join(sizes) or 'there is none'}"
+                )
+            if (
+                clock in coords and dim in coords[clock].dims
+            ):  # the samples of a grid point serve all its frequencies
                 raise InputError(f"{key}: must not be a dimension of {clock}")
-        # strengths that change with the time, and f + offset, depend on the frequency itself: no scaling law then
+        # strengths that change with the time, and f + offset, depend on the frequency itself: no
+        # scaling law then
         unscaled = {"displacement_amplitude", "pgv", "arias_intensity"} & {*coords, *drawn} or (
             clock in drawn and drawn[clock].kind == "offset"
         )
-        own = grid_inputs.grid_sizes({name: one for name, one in inputs.items() if name != clock or unscaled})
+        own = grid_inputs.grid_sizes(
+            {name: one for name, one in inputs.items() if name != clock or unscaled}
+        )
         self.pooled = {dim: sizes[dim] for dim in sampling.over}
         self.sizes = {dim: size for dim, size in sizes.items() if dim not in self.pooled}
         self.scaled = {dim: size for dim, size in self.sizes.items() if dim not in own}
         self.solved = {dim: size for dim, size in self.sizes.items() if dim in own}
-        #: What displacements are divided by the square of; where it is not 1, cells are solved at 1.
+        #: What displacements are divided by the square of; where it is not 1, cells are solved at
+        #: 1.
         self.frequency = xr.Variable((), 1.0)
         if self.scaled:
             self.frequency = inputs[clock] if is_wave else 1.0 / inputs[clock]
             inputs[clock] = xr.Variable((), 1.0)
         self.attrs = attrs | ({"pooled": resources.grid_text(self.pooled)} if self.pooled else {})
         #: Samples and runs of a grid point, all draws with all that is pooled.
-        self.samples, self.runs = (n * math.prod(self.pooled.values()) for n in (sampling.samples, sampling.runs))
+        self.samples, self.runs = (
+            n * math.prod(self.pooled.values()) for n in (sampling.samples, sampling.runs)
+        )
         #: How many points are solved together: in 30 MB, yet enough to keep the kernels busy.
         self.points = max(1_000_000 // self.runs, 1)
         # as of any plan
@@ -302,7 +360,9 @@ class SamplePlan(plans.Plan):
 
     def part(self, chunk: chunks.Chunk) -> "SamplePlan":
         """The plan cut to a chunk of its grid."""
-        return SamplePlan(self.sampling, self.problem, chunks.variables_within(chunk, self.coords), self.attrs)
+        return SamplePlan(
+            self.sampling, self.problem, chunks.variables_within(chunk, self.coords), self.attrs
+        )
 
     def template(self) -> xr.Dataset:
         """The statistics with their dimensions and coordinates but no values: zeros that take no memory."""
@@ -315,13 +375,20 @@ class SamplePlan(plans.Plan):
             "bound": [*ENDS],
         }
         own_dims = dict.fromkeys(dim for dims in self.results.values() for dim in dims)
-        own_coords = {dim: xr.Variable((dim,), values[dim], variables.STATISTIC_COORDINATES[dim]) for dim in own_dims}
+        own_coords = {
+            dim: xr.Variable((dim,), values[dim], variables.STATISTIC_COORDINATES[dim])
+            for dim in own_dims
+        }
         lengths = self.sizes | {dim: one.size for dim, one in own_coords.items()}
         results = {}
         for name, own in self.results.items():
             dims = (*(self.sizes if name in _BY_FREQUENCY else self.solved), *own)
             zero = np.zeros((), variables.RESULT_DTYPES.get(name, "float64"))
-            results[name] = (dims, np.broadcast_to(zero, [lengths[dim] for dim in dims]), variables.STATISTICS[name])
+            results[name] = (
+                dims,
+                np.broadcast_to(zero, [lengths[dim] for dim in dims]),
+                variables.STATISTICS[name],
+            )
         return xr.Dataset(results, self.coords | own_coords, self.attrs).drop_dims(self.pooled)
 
     def solve(self, progress: Callable[[int], None] | None = None) -> xr.Dataset:
@@ -343,11 +410,18 @@ class SamplePlan(plans.Plan):
                 target[chunk] = xr.Variable(dims, values.reshape([sizes[dim] for dim in dims]))
         return table
 
-    def _statistics(self, chunk: chunks.Chunk, progress: Callable[[int], None] | None) -> dict[str, NDArray[Any]]:
+    def _statistics(
+        self, chunk: chunks.Chunk, progress: Callable[[int], None] | None
+    ) -> dict[str, NDArray[Any]]:
         """The results at the grid points of a chunk, (solved, frequencies, own dimension)."""
-        sampling, sizes = self.sampling, {dim: cut.stop - cut.start for dim, cut in chunk.items()}
+        sampling = self.sampling
+        sizes = {dim: cut.stop - cut.start for dim, cut in chunk.items()}
         inputs, drawn = self._drawn(chunk, sizes)
-        names = ("permanent_displacement", "validity", *(["sliding_mode"] if "mode_share" in self.names else []))
+        names = (
+            "permanent_displacement",
+            "validity",
+            *(["sliding_mode"] if "mode_share" in self.names else []),
+        )
         solved = engine.solve(engine.Request(self.problem, drawn, inputs, names, progress))
         runs = [solved[name].values.reshape(math.prod(sizes.values()), -1) for name in names]
         # of Sobol indices the first runs are the samples
@@ -362,14 +436,20 @@ class SamplePlan(plans.Plan):
         def reduce(point: int) -> None:
             values = np.sort(displacement[point])
             values = values[: np.searchsorted(values, np.nan)]  # NaN goes last
-            # these slide without any shaking: their displacement has no value and exceeds every threshold
+            # these slide without any shaking: their displacement has no value and exceeds every
+            # threshold
             unstable = np.count_nonzero(flags[point] & variables.Validity.STATICALLY_UNSTABLE.value)
             if values.size + unstable:
-                above = values.size - np.searchsorted(values, sampling.thresholds * squares[point], side="right")
+                above = values.size - np.searchsorted(
+                    values, sampling.thresholds * squares[point], side="right"
+                )
                 exceeding[point] = (above + unstable) / (values.size + unstable)
             if values.size:
                 with np.errstate(over="ignore"):  # refused below
-                    moved[point] = np.append(np.quantile(values, sampling.quantiles), values.mean()) / squares[point]
+                    moved[point] = (
+                        np.append(np.quantile(values, sampling.quantiles), values.mean())
+                        / squares[point]
+                    )
 
         threads.spread(range(len(displacement)), reduce)
         for wrong in frequency[np.isinf(moved).any(axis=-1)][:1]:
@@ -379,16 +459,22 @@ class SamplePlan(plans.Plan):
             "displacement_quantile": moved[..., :-1],
             "mean_displacement": moved[..., -1],
             "exceedance_probability": exceeding,
-            "flag_share": np.stack([np.mean(flags & flag.value != 0, axis=-1) for flag in variables.Validity], axis=-1),
+            "flag_share": np.stack(
+                [np.mean(flags & flag.value != 0, axis=-1) for flag in variables.Validity], axis=-1
+            ),
             "valueless_share": np.isnan(displacement).mean(axis=-1),
         }
         for codes in modes:
-            found["mode_share"] = np.stack([np.mean(codes == mode, axis=-1) for mode in _MODES], axis=-1)
+            found["mode_share"] = np.stack(
+                [np.mean(codes == mode, axis=-1) for mode in _MODES], axis=-1
+            )
         if sampling.sensitivity:
             found |= sobol_indices(sampling, runs[0])
         return found
 
-    def _drawn(self, chunk: chunks.Chunk, sizes: dict[str, int]) -> tuple[dict[str, xr.Variable], dict[str, int]]:
+    def _drawn(
+        self, chunk: chunks.Chunk, sizes: dict[str, int]
+    ) -> tuple[dict[str, xr.Variable], dict[str, int]]:
         """Inputs of the runs of a chunk, and their sizes, (solved, pooled, draw): a sweep with one more dimension."""
         inputs = chunks.variables_within(chunk, self.inputs)
         sizes = sizes | self.pooled | {_DRAW: self.sampling.runs}

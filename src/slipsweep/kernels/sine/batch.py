@@ -1,9 +1,9 @@
 """A batch: cells whose motion is computed together, and Eq. 4 in them.
 
-A batch is a NumPy record with an array of `WIDTH` numbers for each quantity.  So the compiler knows where each array
-is, that no two overlap and how long they are: a loop over the cells of a batch becomes SIMD.  All `WIDTH` cells are
-computed, used or not: a scalar remainder of a loop would round otherwise, and the last digits of a cell would depend
-on how many others there are.
+A batch is a NumPy record with an array of `WIDTH` numbers for each quantity.  So the compiler knows
+where each array is, that no two overlap and how long they are: a loop over the cells of a batch
+becomes SIMD.  All `WIDTH` cells are computed, used or not: a scalar remainder of a loop would round
+otherwise, and the last digits of a cell would depend on how many others there are.
 """
 
 import math
@@ -30,35 +30,63 @@ BATCH = np.dtype(
             (name, np.float64, (WIDTH,))
             for name in (
                 # the block (`kernels.block`), and ψ at which Üg = Üy
-                "amplitude", "yield_acceleration", "mu_s", "tan_theta", "delta_mu", "decay_rate", "yield_phase",
-                # known of a cell before its motion: μmin, mode, and Eq. 4 at Üg = Üy and at the peak
-                "minimum_friction", "sliding_mode", "response_at_yield", "response_at_peak",
+                "amplitude",
+                "yield_acceleration",
+                "mu_s",
+                "tan_theta",
+                "delta_mu",
+                "decay_rate",
+                "yield_phase",
+                # known of a cell before its motion: μmin, mode, and Eq. 4 at Üg = Üy and at the
+                # peak
+                "minimum_friction",
+                "sliding_mode",
+                "response_at_yield",
+                "response_at_peak",
                 # the search for an event: where it is, and whether it has been found
-                "event", "found",
+                "event",
+                "found",
                 # a part of the cycle, from ψ to ψ, and the gains of V and W on it
-                "start", "end", "gain", "moment",
-                # a pulse: b from its beginning and from the peak on, V and W up to now, the largest V
-                "level", "held", "velocity", "displacement", "peak_velocity",
+                "start",
+                "end",
+                "gain",
+                "moment",
+                # a pulse: b from its beginning and from the peak on, V and W up to now, the largest
+                # V
+                "level",
+                "held",
+                "velocity",
+                "displacement",
+                "peak_velocity",
                 # continuous sliding (`continuous`)
-                "quarter", "drift", "missed", "dip",
+                "quarter",
+                "drift",
+                "missed",
+                "dip",
                 # whether all events have been found, and the flags of the motion
-                "solved", "validity",
+                "solved",
+                "validity",
             )
         ]
-        # which cell of the results this is, and the kind of its motion (`kinds`); how many cells there are
+        # which cell of the results this is, and the kind of its motion (`kinds`); how many cells
+        # there are
         + [("cell", np.int64, (WIDTH,)), ("kind", np.int64, (WIDTH,)), ("used", np.int64)],
     )
-)  # fmt: skip
+)
 
 Batch: TypeAlias = np.record
 
 #: Rows of the results, (fields of `Motion`, cells).
 DISPLACEMENT, PEAK_VELOCITY, SLIDING_MODE, VALIDITY = (
-    Motion._fields.index(name) for name in ("displacement", "peak_velocity", "sliding_mode", "validity")
+    Motion._fields.index(name)
+    for name in ("displacement", "peak_velocity", "sliding_mode", "validity")
 )
 
-#: Gauss–Legendre rule on [0, 1].  It is right to 1e-13 where friction falls by no more than e^6 (`MOST_E_FOLDINGS`).
-NODES, WEIGHTS = ((a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(12), (1.0, 0.0), strict=True))
+#: Gauss–Legendre rule on [0, 1].  It is right to 1e-13 where friction falls by no more than e^6
+#: (`MOST_E_FOLDINGS`).
+NODES, WEIGHTS = (
+    (a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(12), (1.0, 0.0), strict=True)
+)
 MOST_E_FOLDINGS = 6.0
 
 #: An event is found when Newton's last step is smaller than this part of its value: 1e-14 is left.
@@ -84,9 +112,14 @@ def load(cells: np.ndarray, first: int, batch: Batch) -> None:
 def given(batch: Batch, j: int) -> Cell:
     """What is given of cell j of a batch."""
     return Cell(
-        batch.tan_theta[j], batch.mu_s[j], batch.amplitude[j], batch.yield_acceleration[j], batch.decay_rate[j],
-        batch.delta_mu[j], batch.minimum_friction[j],
-    )  # fmt: skip
+        batch.tan_theta[j],
+        batch.mu_s[j],
+        batch.amplitude[j],
+        batch.yield_acceleration[j],
+        batch.decay_rate[j],
+        batch.delta_mu[j],
+        batch.minimum_friction[j],
+    )
 
 
 @inlined
@@ -98,7 +131,9 @@ def friction(batch: Batch, j: int, x: float, g: float) -> float:
 @inlined
 def relative_acceleration(batch: Batch, j: int, x: float, g: float) -> tuple[float, float]:
     """Eq. 4, E, as D(x) = x − E(x), and dD/dx (x ≠ 0, or a zero with the sign of its side)."""
-    mu_s, tan_theta, mu = batch.mu_s[j], batch.tan_theta[j], friction(batch, j, x, g)
+    mu_s = batch.mu_s[j]
+    tan_theta = batch.tan_theta[j]
+    mu = friction(batch, j, x, g)
     friction_slope = exponential_derivatives(mu, batch.decay_rate[j], g)[0]
     slope = eq.relative_acceleration_slope(x, mu, friction_slope, mu_s, tan_theta, g)
     return eq.relative_acceleration(x, mu, mu_s, tan_theta, g), slope
@@ -114,7 +149,8 @@ def held_gains(amplitude: float, held: float, start: float, end: float) -> tuple
 
     docs/numerics.md#held-block-acceleration
     """
-    width, excess = end - start, amplitude - held
+    width = end - start
+    excess = amplitude - held
     before = angle_minus_sine(start)
     gain = excess * width - amplitude * (angle_minus_sine(end) - before)
     swept = half_square_minus_versine(end) - half_square_minus_versine(start) - before * width
@@ -133,7 +169,8 @@ def integrate_eq4(batch: Batch, side: float, g: float) -> None:
     for j in range(WIDTH):
         batch.gain[j] = batch.moment[j] = 0.0
     for node in range(NODES.size):
-        at, weight = NODES[node], WEIGHTS[node]
+        at = NODES[node]
+        weight = WEIGHTS[node]
         for j in range(WIDTH):
             psi = batch.start[j] + (batch.end[j] - batch.start[j]) * at
             x = side * (batch.amplitude[j] * (1.0 - versine(psi)))
@@ -142,18 +179,22 @@ def integrate_eq4(batch: Batch, side: float, g: float) -> None:
             batch.gain[j] += lost
             batch.moment[j] += (1.0 - at) * lost
     for j in range(WIDTH):
-        width, tan_theta = batch.end[j] - batch.start[j], batch.tan_theta[j]
+        width = batch.end[j] - batch.start[j]
+        tan_theta = batch.tan_theta[j]
         plane, plane_moment = held_gains(batch.amplitude[j], 0.0, batch.start[j], batch.end[j])
         batch.gain[j] = side * batch.gain[j] * width - tan_theta * tan_theta * plane
-        batch.moment[j] = side * batch.moment[j] * width * width - tan_theta * tan_theta * plane_moment
+        batch.moment[j] = (
+            side * batch.moment[j] * width * width - tan_theta * tan_theta * plane_moment
+        )
 
 
 @scalar
 def find_eq4_event(batch: Batch, holds: float, side: float, g: float) -> None:
     """The |Üg| at which D(±|Üg|) = 0, ± is `side`; or, if `holds` is 1, at which E(Üg) = b, `level`: field `event`.
 
-    Newton's iteration of all cells that have not `found` it, from `event` on.  It needs no bracket: each begins on the
-    side from which it cannot pass the root (docs/numerics.md#batches-of-the-sine).
+    Newton's iteration of all cells that have not `found` it, from `event` on.  It needs no bracket:
+    each begins on the side from which it cannot pass the root
+    (docs/numerics.md#batches-of-the-sine).
     """
     for _ in range(_MOST_STEPS):
         missing = 0
@@ -177,11 +218,13 @@ def gains_after_peak(amplitude: float, held: float, psi: float) -> tuple[float, 
     beyond = psi > HALF_PI
     # sin ψ = −sin χ and cos ψ = −cos χ for χ = ψ − π
     near = psi - math.pi if beyond else psi
-    fallen, lag = versine(near), angle_minus_sine(near)
+    fallen = versine(near)
+    lag = angle_minus_sine(near)
     swept = half_square_minus_versine(near)
     if beyond:
         swept = 0.5 * psi * psi - (2.0 - fallen)
-        fallen, lag = 2.0 - fallen, psi + (near - lag)
+        fallen = 2.0 - fallen
+        lag = psi + (near - lag)
     excess = amplitude - held
     rate = excess - amplitude * fallen
     return excess * psi - amplitude * lag, 0.5 * excess * psi * psi - amplitude * swept, rate
@@ -191,7 +234,8 @@ def gains_after_peak(amplitude: float, held: float, psi: float) -> tuple[float, 
 def find_stop(batch: Batch, last: float) -> None:
     """The ψ at which V, `velocity` at the peak, is used up with b `held` from there on: field `event`.
 
-    Newton's iteration of all cells that have not `found` it, from `event` on, beyond the stop, and up to `last`.
+    Newton's iteration of all cells that have not `found` it, from `event` on, beyond the stop, and
+    up to `last`.
     """
     for _ in range(_MOST_STEPS):
         missing = 0

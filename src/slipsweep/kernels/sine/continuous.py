@@ -38,7 +38,8 @@ def quarter_integrals(k: float) -> tuple[float, float]:
     In closed form π/2 (I₀ − L₀) and 1 + π/2 (L₁ − I₁), modified Bessel and Struve functions of k.
     """
     below = _CENTRE - k
-    plain, with_sine = 0.0, 0.0
+    plain = 0.0
+    with_sine = 0.0
     for n in range(_SERIES.size):
         with_sine = with_sine * below + plain
         plain = plain * below + _SERIES[n]
@@ -49,12 +50,14 @@ def quarter_integrals(k: float) -> tuple[float, float]:
 def slide_on(batch: Batch, options: Options) -> None:
     """W of N cycles by Eq. 4 throughout.
 
-    Over a rising quarter of the cycle let q₀ = ∫ e^(−k sin φ) dφ, q₁ = ∫ sin φ e^(−k sin φ) dφ, k = λA/g, and
+    Over a rising quarter of the cycle let q₀ = ∫ e^(−k sin φ) dφ, q₁ = ∫ sin φ e^(−k sin φ) dφ, k =
+    λA/g, and
 
         G = g (μs π/2 − (μs + Δμ) q₀)        R = A tan θ (μs − tan θ − (μs + Δμ) q₁)
 
-    V gains G + R over a quarter of the positive half cycle (`quarter`), R − G over one of the negative, and 4R over a
-    cycle (`drift`).  Up to Üg = Üy, at ψy, the first cycle misses d₀ = ∫ D dψ (`missed`) and d₁ = ∫ (ψy − ψ) D dψ:
+    V gains G + R over a quarter of the positive half cycle (`quarter`), R − G over one of the
+    negative, and 4R over a cycle (`drift`).  Up to Üg = Üy, at ψy, the first cycle misses d₀ = ∫ D
+    dψ (`missed`) and d₁ = ∫ (ψy − ψ) D dψ:
 
         W₁ = ψy d₀ − d₁ + (π/2)(2 (G + R) − d₀) + π (2 (G + R) − d₀ + (R − G))
 
@@ -62,45 +65,66 @@ def slide_on(batch: Batch, options: Options) -> None:
     """
     g = options.g
     for j in range(WIDTH):
-        amplitude, mu_s, tan_theta = batch.amplitude[j], batch.mu_s[j], batch.tan_theta[j]
+        amplitude = batch.amplitude[j]
+        mu_s = batch.mu_s[j]
+        tan_theta = batch.tan_theta[j]
         largest_friction = mu_s + batch.delta_mu[j]
         plain, with_sine = quarter_integrals(batch.decay_rate[j] * amplitude / g)
         drift = amplitude * tan_theta * ((mu_s - tan_theta) - largest_friction * with_sine)
         batch.quarter[j] = g * (HALF_PI * mu_s - largest_friction * plain) + drift
         batch.drift[j] = 4.0 * drift
-        batch.start[j], batch.end[j], batch.level[j] = -HALF_PI, batch.yield_phase[j], 0.0
-        batch.peak_velocity[j], batch.validity[j], batch.solved[j] = math.nan, 0.0, 1.0
+        batch.start[j] = -HALF_PI
+        batch.end[j] = batch.yield_phase[j]
+        batch.level[j] = 0.0
+        batch.peak_velocity[j] = math.nan
+        batch.validity[j] = 0.0
+        batch.solved[j] = 1.0
     integrate_eq4(batch, 1.0, g)
     later = options.cycles - 1.0
     for j in range(WIDTH):
-        missed, drift, up, yields = batch.gain[j], batch.drift[j], batch.quarter[j], batch.yield_phase[j]
+        missed = batch.gain[j]
+        drift = batch.drift[j]
+        up = batch.quarter[j]
+        yields = batch.yield_phase[j]
         down = 0.5 * drift - up  # over a quarter of the negative half cycle
-        first = yields * missed - batch.moment[j] + HALF_PI * (2.0 * up - missed) + math.pi * (2.0 * up - missed + down)
+        first = (
+            yields * missed
+            - batch.moment[j]
+            + HALF_PI * (2.0 * up - missed)
+            + math.pi * (2.0 * up - missed + down)
+        )
         again = 3.0 * up + down - 2.0 * missed + drift * options.cycles
-        batch.displacement[j], batch.missed[j] = first + later * math.pi * again, missed
+        batch.displacement[j] = first + later * math.pi * again
+        batch.missed[j] = missed
 
 
 @scalar
 def find_peak_velocity(batch: Batch, options: Options) -> None:
     """The largest V of all cycles: where D changes its sign, or at the end of a half cycle.
 
-    D is ∓ g Δμ at Üg = 0.  On the rise of the positive half cycle it is concave (by `kinds.classify`), on the negative
-    one convex (as long as the block does not lift off): it changes its sign once at most.  Where μ = μs it is
-    −tan² θ |Üg|: before the zero on the positive half, behind it on the negative one, from where Newton's iteration
-    passes it once, and not again.  Up to there V gains ∫ D dψ: the `dip` and the `bump`.  The fall mirrors the rise: D
-    changes its sign back when V has gained what it does in the half cycle, less the dip or the bump.
+    D is ∓ g Δμ at Üg = 0.  On the rise of the positive half cycle it is concave (by
+    `kinds.classify`), on the negative one convex (as long as the block does not lift off): it
+    changes its sign once at most.  Where μ = μs it is −tan² θ |Üg|: before the zero on the positive
+    half, behind it on the negative one, from where Newton's iteration passes it once, and not
+    again.  Up to there V gains ∫ D dψ: the `dip` and the `bump`.  The fall mirrors the rise: D
+    changes its sign back when V has gained what it does in the half cycle, less the dip or the
+    bump.
     """
-    cycles, g = options.cycles, options.g
+    cycles = options.cycles
+    g = options.g
     for side in (1.0, -1.0):
         for j in range(WIDTH):
             at_peak, slope = relative_acceleration(batch, j, side * batch.amplitude[j], g)
             turns = side * at_peak > 0.0
-            # one that has its first sign at the peak may have changed twice, unless it still goes away from it
+            # one that has its first sign at the peak may have changed twice, unless it still goes
+            # away from it
             batch.solved[j] = batch.solved[j] if turns | (slope >= 0.0) else 0.0
             batch.found[j] = 0.0 if turns else 1.0
             # μ = μs after ln(1 + r) e-foldings, r = Δμ/μs, nearly 2r/(2 + r)
             delta_mu = batch.delta_mu[j]
-            at_static = 2.0 * delta_mu * g / ((2.0 * batch.mu_s[j] + delta_mu) * batch.decay_rate[j])
+            at_static = (
+                2.0 * delta_mu * g / ((2.0 * batch.mu_s[j] + delta_mu) * batch.decay_rate[j])
+            )
             batch.event[j] = at_static if turns else 0.0
             batch.dip[j] = batch.gain[j]
         find_eq4_event(batch, 0.0, side, g)
@@ -109,9 +133,14 @@ def find_peak_velocity(batch: Batch, options: Options) -> None:
             batch.end[j] = rising_phase(batch.event[j], batch.amplitude[j])
         integrate_eq4(batch, side, g)
     for j in range(WIDTH):
-        dip, bump, missed, drift = batch.dip[j], batch.gain[j], batch.missed[j], batch.drift[j]
-        half, other_half = 2.0 * batch.quarter[j], drift - 2.0 * batch.quarter[j]
-        # of half cycles that are entered with V = 0, and the negative one with what the positive one has left
+        dip = batch.dip[j]
+        bump = batch.gain[j]
+        missed = batch.missed[j]
+        drift = batch.drift[j]
+        half = 2.0 * batch.quarter[j]
+        other_half = drift - 2.0 * batch.quarter[j]
+        # of half cycles that are entered with V = 0, and the negative one with what the positive
+        # one has left
         from_yield = max(half, half - dip)
         positive = max(max(0.0, dip), from_yield)
         negative = half + max(max(0.0, other_half), max(bump, other_half - bump))

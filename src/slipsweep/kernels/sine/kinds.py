@@ -20,30 +20,40 @@ from slipsweep.kernels.sine.batch import (
 from slipsweep.model import equations as eq
 from slipsweep.model.equations import CONTINUOUS, STICK_SLIP, STUCK
 
-#: Kinds of motion that batches are made of: from Üg = Üy to the peak b = Üy throughout (Newmark's block, too), or
-#: b = Üy and then Eq. 4, or at rest until Eq. 4 falls below Üg; and Eq. 4 all the time.
+#: Kinds of motion that batches are made of: from Üg = Üy to the peak b = Üy throughout (Newmark's
+#: block, too), or b = Üy and then Eq. 4, or at rest until Eq. 4 falls below Üg; and Eq. 4 all the
+#: time.
 YIELD_GOVERNS, FOLLOWS_EQ4, STICKS_AT_YIELD, SLIDES_ON = range(4)
 KINDS = 4
 #: No motion: stuck, without a value, or as Eq. 4 does not fall below Üg; and any other.
-RESTS, OTHER = 4, 5
+RESTS = 4
+OTHER = 5
 
 
 @inlined
 def pulse_kind(batch: Batch, j: int, g: float) -> int:
     """The kind of stick-slip: conditions under which b is held up to one Üg at most and follows Eq. 4 beyond it."""
-    tan_theta, mu_s, decay_rate = batch.tan_theta[j], batch.mu_s[j], batch.decay_rate[j]
-    start, end = batch.yield_acceleration[j], batch.amplitude[j]
-    sticks, follows = batch.response_at_yield[j] >= start, batch.response_at_peak[j] > start
-    # as D > 0 at the peak, it stays positive once it is: either E is convex from where sliding may begin, hence D
-    # concave; or D, convex first, is negative at Üy or rises there, and dE/dx > 0, both by bounds with the largest
-    # friction
+    tan_theta = batch.tan_theta[j]
+    mu_s = batch.mu_s[j]
+    decay_rate = batch.decay_rate[j]
+    start = batch.yield_acceleration[j]
+    end = batch.amplitude[j]
+    sticks = batch.response_at_yield[j] >= start
+    follows = batch.response_at_peak[j] > start
+    # as D > 0 at the peak, it stays positive once it is: either E is convex from where sliding may
+    # begin, hence D concave; or D, convex first, is negative at Üy or rises there, and dE/dx > 0,
+    # both by bounds with the largest friction
     largest_friction = mu_s + batch.delta_mu[j]
     decay_at_yield = decay_rate * eq.normal_acceleration(start, tan_theta, g) / g
     decay_at_peak = decay_rate * eq.normal_acceleration(end, tan_theta, g) / g
     convex = decay_at_yield >= 2.0 * tan_theta
     steepest = min(decay_at_peak - tan_theta, tan_theta)
-    rises = (mu_s if sticks else largest_friction) * steepest < eq.limit_denominator(mu_s, tan_theta)
-    lags = sticks | (largest_friction * (tan_theta - decay_at_yield) <= tan_theta * (mu_s - tan_theta))
+    rises = (mu_s if sticks else largest_friction) * steepest < eq.limit_denominator(
+        mu_s, tan_theta
+    )
+    lags = sticks | (
+        largest_friction * (tan_theta - decay_at_yield) <= tan_theta * (mu_s - tan_theta)
+    )
     smooth = (batch.response_at_peak[j] < end) & (convex | (rises & lags))
     gentle = decay_rate * end <= MOST_E_FOLDINGS * g
     kind = (STICKS_AT_YIELD if sticks else FOLLOWS_EQ4) if gentle else OTHER
@@ -57,7 +67,8 @@ def stays_with_base(batch: Batch, j: int, g: float) -> bool:
 
     D is convex, then concave: nowhere larger than at Üy or than its tangent at the peak.
     """
-    start, peak = batch.yield_acceleration[j], batch.amplitude[j]
+    start = batch.yield_acceleration[j]
+    peak = batch.amplitude[j]
     rate, slope = relative_acceleration(batch, j, peak, g)
     highest = rate - min(slope, 0.0) * (peak - start)
     return (batch.response_at_yield[j] >= start) & (highest <= 0.0)
@@ -66,27 +77,34 @@ def stays_with_base(batch: Batch, j: int, g: float) -> bool:
 @scalar
 def classify(batch: Batch, first: int, options: Options, results: np.ndarray) -> None:
     """The block of each cell of a batch and the kind of its motion; mode and a-priori validity go into the results."""
-    g, slides = options.g, 0
+    g = options.g
+    slides = 0
     for j in range(WIDTH):
         interface = interface_of(given(batch, j), options.rise, g)
-        batch.yield_acceleration[j], batch.delta_mu[j] = interface.yield_acceleration, interface.delta_mu
+        batch.yield_acceleration[j] = interface.yield_acceleration
+        batch.delta_mu[j] = interface.delta_mu
         batch.minimum_friction[j] = interface.minimum_friction
-        batch.sliding_mode[j], batch.validity[j] = interface.sliding_mode, interface.validity
+        batch.sliding_mode[j] = interface.sliding_mode
+        batch.validity[j] = interface.validity
         batch.kind[j] = RESTS
         slides += 1 if interface.sliding_mode > STUCK else 0
     for j in range(batch.used):
-        results[SLIDING_MODE, first + j], results[VALIDITY, first + j] = batch.sliding_mode[j], batch.validity[j]
+        results[SLIDING_MODE, first + j] = batch.sliding_mode[j]
+        results[VALIDITY, first + j] = batch.validity[j]
     if slides == 0:
         return
     for j in range(WIDTH):
-        batch.decay_rate[j] = decay_rate_of(given(batch, j), batch.delta_mu[j], batch.minimum_friction[j], g)
+        batch.decay_rate[j] = decay_rate_of(
+            given(batch, j), batch.delta_mu[j], batch.minimum_friction[j], g
+        )
         batch.yield_phase[j] = rising_phase(batch.yield_acceleration[j], batch.amplitude[j])
     if options.rise == NEWMARK:
         for j in range(WIDTH):
             batch.kind[j] = YIELD_GOVERNS if batch.sliding_mode[j] == STICK_SLIP else RESTS
         return
     for j in range(WIDTH):
-        start, end = batch.yield_acceleration[j], batch.amplitude[j]
+        start = batch.yield_acceleration[j]
+        end = batch.amplitude[j]
         batch.response_at_yield[j] = start - relative_acceleration(batch, j, start, g)[0]
         batch.response_at_peak[j] = end - relative_acceleration(batch, j, end, g)[0]
     for j in range(WIDTH):

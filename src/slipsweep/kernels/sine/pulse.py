@@ -35,19 +35,23 @@ def begin_to_slide(batch: Batch, kind: int, g: float) -> None:
     docs/numerics.md#onset-and-switch
     """
     for j in range(WIDTH):
-        batch.solved[j], batch.validity[j] = 1.0, 0.0
-        batch.level[j], batch.start[j] = batch.yield_acceleration[j], batch.yield_phase[j]
+        batch.solved[j] = 1.0
+        batch.validity[j] = 0.0
+        batch.level[j] = batch.yield_acceleration[j]
+        batch.start[j] = batch.yield_phase[j]
     if kind != STICKS_AT_YIELD:
         return
     for j in range(WIDTH):
         # from where D ceases to be convex: beyond the root before it, and before the root beyond it
-        tan_theta, decay_rate = max(batch.tan_theta[j], _LEAST), max(batch.decay_rate[j], _LEAST)
+        tan_theta = max(batch.tan_theta[j], _LEAST)
+        decay_rate = max(batch.decay_rate[j], _LEAST)
         bend = exponential_inflection(tan_theta, decay_rate, g)
         batch.event[j] = min(max(bend, batch.yield_acceleration[j]), batch.amplitude[j])
         batch.found[j] = 0.0
     find_eq4_event(batch, 0.0, 1.0, g)
     for j in range(WIDTH):
-        batch.solved[j], batch.level[j] = batch.found[j], batch.event[j]
+        batch.solved[j] = batch.found[j]
+        batch.level[j] = batch.event[j]
         batch.start[j] = rising_phase(batch.event[j], batch.amplitude[j])
 
 
@@ -65,7 +69,8 @@ def rise(batch: Batch, kind: int, g: float) -> None:
             batch.velocity[j], batch.displacement[j] = gained
         return
     for j in range(WIDTH):
-        amplitude, level = batch.amplitude[j], batch.level[j]
+        amplitude = batch.amplitude[j]
+        level = batch.level[j]
         rate, slope = relative_acceleration(batch, j, amplitude, g)
         excess = amplitude - rate - level
         follows = excess > 0.0
@@ -79,7 +84,8 @@ def rise(batch: Batch, kind: int, g: float) -> None:
         switch = max(rising_phase(batch.event[j], batch.amplitude[j]), batch.start[j])
         gained = held_gains(batch.amplitude[j], batch.level[j], batch.start[j], switch)
         batch.velocity[j], batch.displacement[j] = gained
-        batch.start[j], batch.end[j] = switch, 0.0
+        batch.start[j] = switch
+        batch.end[j] = 0.0
     integrate_eq4(batch, 1.0, g)
     for j in range(WIDTH):
         batch.displacement[j] += batch.moment[j] - batch.velocity[j] * batch.start[j]
@@ -90,29 +96,35 @@ def rise(batch: Batch, kind: int, g: float) -> None:
 def fall(batch: Batch, options: Options) -> None:
     """b held from the peak to the stop; with Eq. 12 no further than to t5, Üg = 0, where `velocity` is then V.
 
-    V at t5 is V + A − b π/2.  V is largest, V₀, at Üg = b, ψ₀, and below the parabola V₀ − ½ A sin ψ₀ (ψ − ψ₀)²
-    from there up to t5.  Beyond t5, χ = ψ − π/2, it is V − b χ − A vers χ, and vers χ ≥ 2 χ²/π².  The zeros of the
-    parabola, and of that with 2 χ²/π², are beyond the stop: there the iteration starts.
-    docs/numerics.md#stop
+    V at t5 is V + A − b π/2.  V is largest, V₀, at Üg = b, ψ₀, and below the parabola V₀ − ½ A sin
+    ψ₀ (ψ − ψ₀)² from there up to t5.  Beyond t5, χ = ψ − π/2, it is V − b χ − A vers χ, and vers χ
+    ≥ 2 χ²/π².  The zeros of the parabola, and of that with 2 χ²/π², are beyond the stop: there the
+    iteration starts. docs/numerics.md#stop
     """
     eq12 = options.recoupling != INTEGRATE
     missing = 0
     for j in range(WIDTH):
         at_t5 = batch.velocity[j] + batch.amplitude[j] - HALF_PI * batch.held[j]
         found = eq12 & (at_t5 > 0.0)
-        batch.gain[j], batch.event[j], batch.found[j] = at_t5, HALF_PI, 1.0 if found else 0.0
+        batch.gain[j] = at_t5
+        batch.event[j] = HALF_PI
+        batch.found[j] = 1.0 if found else 0.0
         batch.peak_velocity[j] = math.nan
         missing += 0 if found else 1
     if options.wants_peak or missing > 0:
         for j in range(WIDTH):
-            amplitude, held, at_t5 = batch.amplitude[j], batch.held[j], batch.gain[j]
+            amplitude = batch.amplitude[j]
+            held = batch.held[j]
+            at_t5 = batch.gain[j]
             top = -rising_phase(held, amplitude)
             peak = batch.velocity[j] + held_gains(amplitude, held, 0.0, top)[0]
             sine = top - angle_minus_sine(top)
             before_t5 = min(top + math.sqrt(2.0 * peak / (amplitude * sine)), HALF_PI)
             longest = max(at_t5, 0.0) / held
             curvature = amplitude / held * (4.0 / (math.pi * math.pi))
-            after_t5 = HALF_PI + min(2.0 * longest / (1.0 + math.sqrt(1.0 + 2.0 * curvature * longest)), math.pi)
+            after_t5 = HALF_PI + min(
+                2.0 * longest / (1.0 + math.sqrt(1.0 + 2.0 * curvature * longest)), math.pi
+            )
             beyond = HALF_PI if eq12 else after_t5
             batch.event[j] = beyond if at_t5 > 0.0 else before_t5
             batch.peak_velocity[j] = peak if options.wants_peak else math.nan
@@ -130,15 +142,15 @@ def fall(batch: Batch, options: Options) -> None:
 def repeat(batch: Batch, kind: int, options: Options) -> None:
     """Eq. 12 from t5 on, and all cycles: W, and the largest V.
 
-    By integration the block is at rest within the cycle, and all are alike.  For Eq. 12 let L be V and M be W at t5, v₁
-    what is left of L at the next Üg = Üy, h the phase from Üg = Üy to t5, and W₀ = M + (L² − v₁²)/(2b).  Where a block
-    that moves at Üg = Üy goes on as one at rest does, with b = Üy, each of N cycles adds v₁ to V, and the last slides
-    to its stop:
+    By integration the block is at rest within the cycle, and all are alike.  For Eq. 12 let L be V
+    and M be W at t5, v₁ what is left of L at the next Üg = Üy, h the phase from Üg = Üy to t5, and
+    W₀ = M + (L² − v₁²)/(2b).  Where a block that moves at Üg = Üy goes on as one at rest does, with
+    b = Üy, each of N cycles adds v₁ to V, and the last slides to its stop:
 
         W = (N − 1)(W₀ + π v₁ (N − 2)) + M + (N − 1) v₁ h + (L + (N − 1) v₁)²/(2b)
 
-    A block that sticks at Üg = Üy when at rest does not when it moves: such a cell is left to the general kernel.
-    docs/numerics.md#batches-of-the-sine
+    A block that sticks at Üg = Üy when at rest does not when it moves: such a cell is left to the
+    general kernel. docs/numerics.md#batches-of-the-sine
     """
     if options.recoupling == INTEGRATE:
         for j in range(WIDTH):
@@ -146,7 +158,9 @@ def repeat(batch: Batch, kind: int, options: Options) -> None:
         return
     later = options.cycles - 1.0
     for j in range(WIDTH):
-        held, at_t5, to_t5 = batch.held[j], batch.velocity[j], batch.displacement[j]
+        held = batch.held[j]
+        at_t5 = batch.velocity[j]
+        to_t5 = batch.displacement[j]
         pause = 3.0 * HALF_PI + batch.yield_phase[j]
         left = eq.attenuated_velocity(at_t5, held, pause)
         cycle = to_t5 + eq.attenuated_displacement(at_t5, held, pause)

@@ -8,7 +8,15 @@ from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.kernels import block as physics
 from slipsweep.kernels.sine import kinds, pulse
-from slipsweep.kernels.sine.batch import BATCH, DISPLACEMENT, PEAK_VELOCITY, VALIDITY, WIDTH, Batch, load
+from slipsweep.kernels.sine.batch import (
+    BATCH,
+    DISPLACEMENT,
+    PEAK_VELOCITY,
+    VALIDITY,
+    WIDTH,
+    Batch,
+    load,
+)
 from slipsweep.kernels.sine.continuous import find_peak_velocity, slide_on
 from slipsweep.model.equations import STUCK
 
@@ -43,15 +51,25 @@ def solve_batch(batch: Batch, kind: int, options: physics.Options, results: np.n
         pulse.rise(batch, kind, options.g)
         pulse.fall(batch, options)
         pulse.repeat(batch, kind, options)
-    governs = physics.YIELD_GOVERNS if kind == kinds.YIELD_GOVERNS and options.rise != physics.NEWMARK else 0
+    governs = (
+        physics.YIELD_GOVERNS
+        if kind == kinds.YIELD_GOVERNS and options.rise != physics.NEWMARK
+        else 0
+    )
     unsolved = 0
     for k in range(used):
-        cell, displacement = batch.cell[k], batch.displacement[k]
-        validity = physics.without_estimates(int(results[VALIDITY, cell]) | int(batch.validity[k]) | governs)
+        cell = batch.cell[k]
+        displacement = batch.displacement[k]
+        validity = physics.without_estimates(
+            int(results[VALIDITY, cell]) | int(batch.validity[k]) | governs
+        )
         solved = batch.solved[k] > 0.0 and not math.isnan(displacement)  # where sums overflow
-        results[DISPLACEMENT, cell], results[PEAK_VELOCITY, cell] = displacement, batch.peak_velocity[k]
+        results[DISPLACEMENT, cell] = displacement
+        results[PEAK_VELOCITY, cell] = batch.peak_velocity[k]
         results[VALIDITY, cell] = (
-            physics.settled(validity, displacement, batch.amplitude[k]) if solved else physics.UNSOLVED
+            physics.settled(validity, displacement, batch.amplitude[k])
+            if solved
+            else physics.UNSOLVED
         )
         unsolved += 0 if solved else 1
     batch.used = 0
@@ -73,7 +91,8 @@ def solve_sine(cells: np.ndarray, options: physics.Options, results: np.ndarray)
         load(cells, first, loaded)
         kinds.classify(loaded, first, options, results)
         for j in range(loaded.used):
-            kind, cell = loaded.kind[j], first + j
+            kind = loaded.kind[j]
+            cell = first + j
             if kind == kinds.RESTS:
                 at_rest = 0.0 if loaded.sliding_mode[j] >= STUCK else math.nan
                 results[DISPLACEMENT, cell] = results[PEAK_VELOCITY, cell] = at_rest
