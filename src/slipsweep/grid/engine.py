@@ -20,7 +20,6 @@ from slipsweep.grid import solvers, threads
 from slipsweep.grid.chunks import Chunk, grid_chunks, sizes_within, variables_within
 from slipsweep.grid.inputs import Problem
 from slipsweep.kernels.block import UNSOLVED, Cell
-from slipsweep.kernels.grid import CELL
 from slipsweep.model import variables as known
 from slipsweep.model.parameters import number_text
 from slipsweep.motion.intensity import strength_factor
@@ -230,7 +229,9 @@ def _fill_tile(
     finite: bool,
 ) -> None:
     """Solve the cells of a tile, in all its dimensions but the scaled one, and spread them over the results."""
-    cells = np.full((*shape, len(Cell._fields)), math.nan).view(CELL)[..., 0]
+    names = solver.cell.names
+    assert names is not None
+    cells = np.full((*shape, len(names)), math.nan).view(solver.cell)[..., 0]
     with np.errstate(all="ignore"):  # results that overflow are refused below
         for name, values in cell_inputs(problem, inputs).items():
             cells[name] = values

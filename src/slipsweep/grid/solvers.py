@@ -1,5 +1,6 @@
 """Which kernel solves a problem: the sine's SIMD batches, the exact walk under a wave or a record, or steps."""
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -7,11 +8,11 @@ import numpy as np
 
 from slipsweep.grid.inputs import Problem
 from slipsweep.kernels import block as physics
+from slipsweep.kernels import step
 from slipsweep.kernels.exact import workspace_of
-from slipsweep.kernels.grid import find_parameters
+from slipsweep.kernels.grid import CELL, find_parameters
 from slipsweep.kernels.record import solve_record
 from slipsweep.kernels.sine.solve import solve_sine
-from slipsweep.kernels.step import RECTANGLE, SIMPSON, TRAPEZOID, solve_steps
 from slipsweep.kernels.waves import solve_waves
 from slipsweep.model.options import Mendez, Step
 from slipsweep.model.variables import FRICTION_PARAMETERS
@@ -20,7 +21,10 @@ from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import Sine, Waveform
 
-RULES = {"rectangle": RECTANGLE, "trapezoid": TRAPEZOID, "simpson": SIMPSON}
+RULES = {"rectangle": step.RECTANGLE, "trapezoid": step.TRAPEZOID, "simpson": step.SIMPSON}
+
+#: Steps between two samples of a record: one for so many steps a cycle.
+STEPS_PER_SAMPLE = 64
 RISES = {"monotone": physics.MONOTONE, "literal": physics.LITERAL}
 RECOUPLINGS = {"eq12": physics.EQ12, "integrate": physics.INTEGRATE}
 
@@ -37,10 +41,11 @@ _PARAMETER_ROWS = {
 
 
 class Solver(NamedTuple):
-    """What solves cells, of dtype `kernels.grid.CELL`, into results, (rows, cells)."""
+    """What solves cells of a dtype into results, (rows, cells)."""
 
     solve: Callable[[np.ndarray, np.ndarray], Any]
     rows: Mapping[str, int]  # of the results
+    cell: np.dtype[Any] = CELL
 
 
 def options_of(problem: Problem, wants_peak: bool) -> physics.Options:
@@ -79,6 +84,8 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
             under_wave(cells[left], found)
             results[:, left] = found
 
+    if isinstance(problem.solver, Step):
+        return step_solver(problem, options, polarity)
     if isinstance(motion, Record):
         wave = cutting.wave_of_record(motion, polarity)
         return Solver(
@@ -86,14 +93,28 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
             ROWS,
         )
     assert isinstance(motion, Waveform)
-    if isinstance(problem.solver, Step):
-        wave = cutting.wave_of(motion)
-        rule = RULES[problem.solver.rule]
-        count = problem.solver.steps_per_cycle
-        return Solver(
-            lambda cells, results: solve_steps(cells, options, wave, rule, count, results), ROWS
-        )
     return Solver(under_sine if is_plain_sine(motion) else under_wave, ROWS)
+
+
+def step_solver(problem: Problem, options: physics.Options, polarity: float) -> Solver:
+    """What solves cells by steps."""
+    assert isinstance(problem.solver, Step)
+    rule = RULES[problem.solver.rule]
+    count = problem.solver.steps_per_cycle
+    if isinstance(problem.excitation, Record):
+        wave = cutting.wave_of_record(problem.excitation, polarity)
+        on_piece = math.ceil(count / STEPS_PER_SAMPLE)
+    else:
+        wave = cutting.wave_of(problem.excitation)
+        on_piece = 0
+    no_history = step.history_of(np.empty(0), np.empty(0))
+
+    def solve(cells: np.ndarray, results: np.ndarray) -> None:
+        blocks = step.blocks_of(rule, count, on_piece)
+        workspace = np.empty(2 * max(count, on_piece) + 3)
+        step.solve_steps(cells, options, wave, blocks, workspace, no_history, results)
+
+    return Solver(solve, ROWS, step.STEP_CELL)
 
 
 def is_plain_sine(motion: Any) -> bool:

@@ -20,6 +20,8 @@ def part(*fastmath: str, **options: Any) -> Callable[[_Function], _Function]:
         "error_model": "numpy",
         "fastmath": {"contract", *fastmath},
         "forceinline": False,
+        "no_cpython_wrapper": True,
+        "no_cfunc_wrapper": True,
     }
     decorate: Callable[[_Function], _Function] = numba.njit(**(own | options))
     return decorate
