@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 import slipsweep
-from slipsweep.grid import threads
+from slipsweep.grid import engine, threads
+from slipsweep.kernels.block import UNSOLVED
 
 GRID: dict[str, Any] = {
     "theta": np.linspace(0.0, 15.0, 60),
@@ -69,6 +70,66 @@ def test_affinity_limits_threads() -> None:
         "import os, slipsweep.grid.threads; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})"
     )
     assert count_in_process(code=late) == 1
+
+
+# ------------------------------------------------------------------------------- spreading
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_every_part_is_done_once(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(threads, "thread_count", lambda: count)
+    done: list[int] = []
+    threads.spread(range(1000), done.append)
+    assert sorted(done) == [*range(1000)]
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_an_error_in_a_part_ends_the_whole(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The error is raised, parts that have not begun are left out, and no thread stays behind."""
+    monkeypatch.setattr(threads, "thread_count", lambda: count)
+    ending = threading.Event()
+    shutdown = ThreadPoolExecutor.shutdown
+
+    def announced(pool: ThreadPoolExecutor, *arguments: Any, **options: Any) -> None:
+        ending.set()
+        shutdown(pool, *arguments, **options)
+
+    monkeypatch.setattr(ThreadPoolExecutor, "shutdown", announced)
+    begun: list[int] = []
+
+    def work(part: int) -> None:
+        begun.append(part)
+        if part == 1:
+            raise ZeroDivisionError(str(part))
+        if part > 1:
+            ending.wait(60)
+
+    before = threading.active_count()
+    with pytest.raises(ZeroDivisionError, match="1"):
+        threads.spread(range(1000), work)
+    assert {0, 1} <= {*begun}
+    assert len(begun) <= 2 * count
+    assert threading.active_count() == before
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_an_error_in_a_tile_leaves_the_sweep(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its results would be memory that nothing has written."""
+    monkeypatch.setattr(threads, "thread_count", lambda: count)
+    solver_of = engine.solvers.solver_of
+
+    def failing(*arguments: Any) -> Any:
+        solver = solver_of(*arguments)
+
+        def solve(cells: np.ndarray, results: np.ndarray) -> None:
+            solver.solve(cells, results)
+            results[solver.rows["validity"], cells["mu_s"] > 0.899] = UNSOLVED
+
+        return solver._replace(solve=solve)
+
+    monkeypatch.setattr(engine.solvers, "solver_of", failing)
+    with pytest.raises(slipsweep.RunError, match=r"mu_s = 0\.9, .*an event of the motion was not found"):
+        slipsweep.sweep(**GRID, variables=["permanent_displacement"])
 
 
 # ------------------------------------------------------------------------------- who calls
