@@ -428,8 +428,6 @@ def _slide(
     bottom = 0
     while bottom < len(after) and after[bottom].side < 0:
         bottom += 1
-        if bottom < len(after) and after[bottom].first == 0:
-            break
     way_up = after[bottom:]
     at_once = another and all(
         one.first >= 0 and one.last > 0 and (i == 0 or one.first > 0)

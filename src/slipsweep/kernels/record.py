@@ -62,12 +62,13 @@ def slides_continuously(interface: physics.Interface, options: Options, peak: fl
 
 @scalar
 def half_wave_after(wave: Wave, k: int) -> int:
-    """The first piece after the negative half wave that follows interval k at once."""
+    """Return the first piece after the negative half wave that follows interval k at once.
+
+    A sample of exactly 0 between two negative ones is within the half wave.
+    """
     q = wave.interval[k, 1]
     while q < wave.pieces.shape[0] and wave.pieces[q].top < 0.0:
         q += 1
-        if wave.pieces[q - 1].last == 0.0:
-            break
     return q
 
 
