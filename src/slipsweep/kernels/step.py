@@ -460,7 +460,6 @@ def pulse(
     """A pulse of the paper: t1 to t5 in interval k of Üg > 0, and Eq. 12 up to the `following` one (see `train`)."""
     pieces = wave.pieces
     end = wave.interval[k, 1]
-    validity = 0
     p, tau = pulses.beginning(block, wave, k)
     b = physics.starting_acceleration(
         block, max(block.amplitude * pieces[p].first, block.yield_acceleration)
@@ -482,7 +481,6 @@ def pulse(
         if rises:
             state = walk(block, pieces, steps, q, begin, pieces[q].finish, block.rise, state)
         elif state.sliding:
-            validity = physics.KD_NOT_POSITIVE if state.held <= 0.0 else validity
             state = walk(block, pieces, steps, q, begin, pieces[q].finish, int(HELD), state)
     if state.sliding and state.held <= 0.0:
         return pulses.Pulse(0.0, math.nan, math.nan, 0.0, 0.0, physics.KD_NOT_POSITIVE)
@@ -503,9 +501,7 @@ def pulse(
     if state.sliding and (options.recoupling != physics.INTEGRATE or begins == math.inf):
         displacement += eq.attenuated_displacement(velocity, state.held, begins - t5)
         velocity = eq.attenuated_velocity(velocity, state.held, begins - t5)
-    return pulses.Pulse(
-        velocity, displacement, state.peak, min(state.least, velocity), 0.0, validity
-    )
+    return pulses.Pulse(velocity, displacement, state.peak, min(state.least, velocity), 0.0, 0)
 
 
 @scalar
