@@ -13,7 +13,7 @@ from slipsweep.cli import main
 from slipsweep.errors import InputError
 from slipsweep.model.variables import INTENSITY_MEASURES
 from slipsweep.motion.intensity import intensity_measures
-from tests.charts.test_charts import caption, labelled, legend, named
+from tests.support.charts import caption, labelled, legend, named
 
 SWEEPS = Path(__file__).parents[2] / "sweeps"
 

@@ -1,9 +1,12 @@
 """`sweep` and its siblings as functions: what goes in, what comes out, what is refused, what it costs."""
 
 import math
+import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -225,6 +228,39 @@ def test_nothing_unasked_is_computed(cells_solved: list[int]) -> None:
     assert tuple(result.data_vars) == tuple(name for name in RESULTS if name in FRICTION_PARAMETERS)
     assert not cells_solved
     assert slipsweep.sweep(**AXES, variables=["sliding_mode"]).data_vars.keys() == {"sliding_mode"}
+
+
+FURTHER_RESULT = """
+import slipsweep
+for solver in ("cycle", slipsweep.Step("trapezoid", 64)):
+    found = slipsweep.sweep(
+        5, 0.4, [1.0, 4.0], 2.0, excitation="triangle", solver=solver, variables=["lucky"]
+    )
+    print(found.lucky.attrs["units"], found.lucky.values.tolist())
+"""
+
+
+def test_a_kernel_result_is_added_in_one_place(tmp_path: Path) -> None:
+    """A field of `Motion` that `model.variables` names: no kernel and nothing of the grid changes."""
+    package = tmp_path / "slipsweep"
+    source = Path(slipsweep.__file__).parent
+    shutil.copytree(source, package, ignore=shutil.ignore_patterns("__pycache__"))
+    results = "\nRESULTS: dict[str, dict[str, Any]] = {\n"
+    for module, line, added in (
+        ("kernels/block.py", "    continuous_pulses: float\n", "    lucky: float = 7.0\n"),
+        ("model/variables.py", results, '    "lucky": _cf("1", "a number"),\n'),
+    ):
+        text = (package / module).read_text(encoding="utf-8")
+        assert text.count(line) == 1
+        (package / module).write_text(text.replace(line, line + added), encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-c", FURTHER_RESULT],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_DISABLE_JIT": "1"},
+    )
+    assert (done.stdout, done.stderr) == ("1 [7.0, 7.0]\n" * 2, "")
 
 
 def test_progress_counts_every_cell_once() -> None:

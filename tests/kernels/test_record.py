@@ -248,6 +248,28 @@ def test_a_block_that_stops_on_a_plateau_slides_again_at_once(recoupling: str) -
     )
 
 
+@pytest.mark.parametrize("touch", [0.0, -0.0, -1e-12, -1e-300])
+def test_a_sample_of_zero_in_a_negative_half_wave_does_not_end_continuous_sliding(
+    touch: float,
+) -> None:
+    """Records rounded to 0.01 m/s² have many samples of exactly 0."""
+    cell = {"theta": 2.0, "mu_s": 0.3, "yield_acceleration": 1.0}
+    record = Record.sampled([0.0, 6.0, -1.0, touch, -1.0, 6.0, -6.0, 0.0], 0.1)
+    expected = assert_is_reference(record, cell)
+    assert float(expected.permanent_displacement) == pytest.approx(0.2968, abs=5e-5)
+
+
+def test_zero_over_an_interval_ends_continuous_sliding() -> None:
+    """From there on Eq. 12 brakes the block, though the base's acceleration is negative again."""
+    cell = {"theta": 2.0, "mu_s": 0.3, "yield_acceleration": 1.0}
+    after = [-1.0, 0.0, 0.0, 0.0]
+    short, long = (
+        assert_is_reference(Record.sampled([0.0, 6.0, -1.0, 0.0, 0.0, *then], 0.1), cell)
+        for then in ([0.0, 0.0, 0.0, 0.0], after)
+    )
+    assert float(short.permanent_displacement) == float(long.permanent_displacement) > 0.0
+
+
 @pytest.mark.parametrize("seed", range(0, 200, 50))
 def test_mendez_on_made_up_records(seed: int) -> None:
     """Plateaus, zeros touched, records that begin and end anywhere, all options; ``benchmarks.agreement`` has more."""

@@ -159,7 +159,8 @@ def test_modes_and_flags() -> None:
         assert (Validity.NOT_RECOUPLED in validity) == (sticks_and_slips and not case.recoupled), (
             f"case {case}"
         )
-        governs = sticks_and_slips and case.eq4_below_yield and case.model != "newmark"
+        governs = sticks_and_slips and case.eq4_below_yield
+        governs = governs and case.model != "newmark" and case.rise == "monotone"
         assert (Validity.YIELD_GOVERNS in validity) == governs, f"case {case}"
 
 

@@ -41,6 +41,9 @@ FRICTION_ESTIMATED = int(Validity.FRICTION_ESTIMATED)
 UNSOLVED = 1 << 14
 NO_VALUE = int(VALUELESS) | UNSOLVED
 
+#: Cautions and notes of the motion, which a block without a value has not.
+OF_A_VALUE = YIELD_GOVERNS | NOT_RECOUPLED | NEAR_MODE_LIMIT | FRICTION_ESTIMATED
+
 
 class Cell(NamedTuple):
     """What is given of one cell; NaN stands for "by default" in the last four."""
@@ -186,12 +189,12 @@ def block_of(
 
 @inlined
 def settled(validity: int, displacement: float, amplitude: float) -> int:
-    """The flags of a block once its W is known: what is said of a value needs one.
+    """Add `upslope` to the flags of a block; where it has no value, drop what is said of one.
 
     A displacement that is zero to rounding, by the base's peak acceleration A/ω², is none upslope.
     """
     moved = validity | (UPSLOPE if displacement < -1e-12 * amplitude else 0)
-    return moved if validity & NO_VALUE == 0 else validity & ~(NEAR_MODE_LIMIT | FRICTION_ESTIMATED)
+    return moved if validity & NO_VALUE == 0 else validity & ~OF_A_VALUE
 
 
 @inlined

@@ -614,7 +614,6 @@ def pulse(
         slips=0.0,
         logged=0,
     )
-    least_held = math.inf  # at the end of a rise: by Eq. 12 no block comes to rest with b ≤ 0
     while q < end:
         if rises_anew(pieces, q):
             state = reset_held(block, pieces, q, x, state)
@@ -624,7 +623,6 @@ def pulse(
             q = last
         elif state.sliding:
             level = pieces[q].first == pieces[q].last
-            least_held = least_held if level else min(least_held, state.held)
             part = hold(
                 pieces[q], block.amplitude, state.held, state.velocity, tau, pieces[q].finish
             )
@@ -639,7 +637,7 @@ def pulse(
         x = block.amplitude * pieces[min(q, end - 1)].first
         tau = pieces[min(q, end - 1)].begin
     if state.sliding:
-        if state.held <= 0.0:
+        if state.held <= 0.0:  # by Eq. 12 the block does not come to rest
             return Pulse(0.0, math.nan, math.nan, 0.0, state.slips, physics.KD_NOT_POSITIVE)
         next_p = pieces.shape[0]
         next_tau = 0.0
@@ -647,6 +645,5 @@ def pulse(
             next_p, next_tau = beginning(block, wave, following)
         state = recouple(block, options.recoupling, pieces, end, next_p, next_tau, state, log)
     workspace.logged[0] = state.logged
-    validity = physics.KD_NOT_POSITIVE if least_held <= 0.0 else 0
     least = min(state.least, state.velocity)
-    return Pulse(state.velocity, state.displacement, state.peak, least, state.slips, validity)
+    return Pulse(state.velocity, state.displacement, state.peak, least, state.slips, 0)

@@ -23,8 +23,7 @@ _INTERVALS = 32
 class Pulse(NamedTuple):
     """From one Üg = Üy to the next: V at its end, W gained, the largest and the least V, slides begun from rest.
 
-    `validity` says if there is no value: b ≤ 0 at the end of any of its rises (NaN, if at the end
-    of the last).
+    `validity` says if there is no value: the block slides at t5 with b ≤ 0.
     """
 
     velocity: float
@@ -75,11 +74,11 @@ def _rise_above_yield(block: Block, piece: Piece) -> tuple[float, float]:
 
 @scalar
 def yield_governs(block: Block, wave: Wave) -> bool:
-    """Whether Eq. 4 stays at or below the yield value over all that the base rises through or jumps to.
+    """Return whether b = Üy throughout: Eq. 4 is nowhere above Üy where the base rises or jumps to.
 
-    Not said of Newmark's block, which knows no Eq. 4.
+    Only with the monotone rise: with the literal one b follows Eq. 4 below Üy, too.
     """
-    governs = block.rise != physics.NEWMARK
+    governs = block.rise == physics.MONOTONE
     for p in range(wave.pieces.shape[0]):
         low, high = _rise_above_yield(block, wave.pieces[p])
         if governs and low <= high:
@@ -89,8 +88,8 @@ def yield_governs(block: Block, wave: Wave) -> bool:
 
 @scalar
 def yield_seems_to_govern(block: Block, wave: Wave) -> bool:
-    """Whether Eq. 4, by any law, stays at or below Üy on all rises; not said of Newmark's block, which has none."""
-    largest = -math.inf if block.rise != physics.NEWMARK else math.inf
+    """Return the same as `yield_governs`, for any friction law, from samples of Eq. 4."""
+    largest = -math.inf if block.rise == physics.MONOTONE else math.inf
     for p in range(wave.pieces.shape[0]):
         low, high = _rise_above_yield(block, wave.pieces[p])
         before = math.inf

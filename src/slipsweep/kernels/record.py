@@ -62,12 +62,13 @@ def slides_continuously(interface: physics.Interface, options: Options, peak: fl
 
 @scalar
 def half_wave_after(wave: Wave, k: int) -> int:
-    """The first piece after the negative half wave that follows interval k at once."""
+    """Return the first piece after the negative half wave that follows interval k at once.
+
+    A sample of exactly 0 between two negative ones is within the half wave.
+    """
     q = wave.interval[k, 1]
     while q < wave.pieces.shape[0] and wave.pieces[q].top < 0.0:
         q += 1
-        if wave.pieces[q - 1].last == 0.0:
-            break
     return q
 
 
@@ -166,10 +167,9 @@ def remarks_in(
     remarks |= interface.validity & physics.FRICTION_NOT_DECAYING
     if continuous:
         return remarks
-    if physics.stays_below_yield(block, block.yield_acceleration, peak):
+    monotone = block.rise == physics.MONOTONE
+    if monotone and physics.stays_below_yield(block, block.yield_acceleration, peak):
         remarks = physics.YIELD_GOVERNS | (remarks & ~physics.FRICTION_ESTIMATED)
-    if block.rise == physics.LITERAL and physics.response(block, peak) <= 0.0:
-        remarks |= physics.KD_NOT_POSITIVE
     return remarks
 
 
@@ -217,8 +217,7 @@ def solve_cell(
             continuous_pulses += 1.0
         else:
             stick_slips += 1.0
-            # of a record there is a value if b > 0 at the end of the last rise
-            validity |= now.validity if math.isnan(now.displacement) else 0
+            validity |= now.validity
             if (
                 now.velocity > 0.0
                 and following < wave.height.size

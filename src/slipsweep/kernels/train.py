@@ -51,7 +51,7 @@ def train_of(
             peak = max(peak, now.peak)
             least = min(least, now.least)
             validity |= now.validity
-            if velocity > 0.0 and now.validity == 0:
+            if velocity > 0.0 and now.validity == 0 and block.rise != physics.NEWMARK:
                 validity |= physics.NOT_RECOUPLED
             if math.isnan(now.displacement + now.peak) and validity & physics.NO_VALUE == 0:
                 validity |= physics.UNSOLVED

@@ -1,0 +1,123 @@
+"""Lines of thresholds and contours of maps: they lie where the equations put them."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import slipsweep
+from slipsweep.charts import style
+from tests.support.charts import (
+    AMPLITUDES,
+    LINED_SINE,
+    SINE,
+    caption,
+    inside,
+    legend,
+    named,
+)
+
+
+@pytest.mark.parametrize(
+    ("x", "y"), [("frequency", "amplitude"), ("theta", "amplitude"), ("amplitude", "theta")]
+)
+def test_lines_of_yield_and_mode_limit_lie_where_the_equations_put_them(
+    grid: xr.Dataset, x: str, y: str
+) -> None:
+    at = {"theta": 6, "mu_s": 0.3} if x == "frequency" else {"frequency": 1, "mu_s": 0.3}
+    figure = grid.slipsweep.chart("modes", x=x, y=y, at=at)
+    other = x if y == "amplitude" else y
+    thetas = 6.0 if other == "frequency" else grid.theta.values
+    expected = slipsweep.friction_parameters(thetas, 0.3, 1.0)
+    for gid, name in (
+        ("yield_line", "yield_acceleration"),
+        ("limit_line", "limiting_acceleration"),
+    ):
+        (line,) = named(figure, gid)
+        vertices = np.concatenate(line.allsegs[0])
+        along, values = vertices.T if y == "amplitude" else vertices.T[::-1]
+        on_grid = np.isin(along, grid[other])
+        assert on_grid.sum() > 3
+        stable = expected[name].where(expected.yield_acceleration > 0)
+        stable = stable.sel(theta=along[on_grid]) if stable.dims else stable
+        np.testing.assert_allclose(values[on_grid], stable, rtol=1e-12)
+
+
+def test_lines_over_a_displacement_amplitude() -> None:
+    """A = ω²d: on the line of yield d = Üy/ω²."""
+    result = slipsweep.sweep(
+        5.0, 0.4, displacement_amplitude=np.linspace(0.01, 0.4, 23), frequency=[1.0, 2.0, 4.0]
+    )
+    (line,) = named(result.slipsweep.chart("contours"), "yield_line")
+    threshold = slipsweep.friction_parameters(5.0, 0.4, 1.0).yield_acceleration.item()
+    frequencies, amplitudes = np.concatenate(line.allsegs[0]).T
+    on_grid = np.isin(frequencies, result.frequency)
+    assert on_grid.sum() >= 2
+    expected = threshold / (2 * np.pi * frequencies) ** 2
+    np.testing.assert_allclose(amplitudes[on_grid], expected[on_grid], rtol=1e-12)
+
+
+def test_contours_lie_where_the_displacement_is_their_level(grid: xr.Dataset) -> None:
+    figure = grid.slipsweep.chart("contours", at={"theta": 6, "mu_s": 0.45})
+    drawn = named(figure, "contours")
+    assert len(drawn) == 2  # below the mode limit and beyond it
+    assert all(len(segments[0]) for segments in drawn[0].allsegs)
+    checked = 0
+    for side in drawn:
+        for level, segments in zip(side.levels, side.allsegs, strict=True):
+            every = np.concatenate([*segments, np.empty((0, 2))])
+            # between rows the amplitude is interpolated too
+            rows = every[np.isclose(every[:, 1:], AMPLITUDES).any(axis=1)][::5]
+            for frequency, amplitude in rows:
+                exact = slipsweep.sweep(
+                    6.0, 0.45, amplitude, frequency, excitation=SINE
+                ).permanent_displacement
+                assert exact.item() == pytest.approx(
+                    10**level, rel=0.02
+                )  # straight in f between points
+            checked += len(rows)
+    assert checked > 20
+
+
+def test_what_does_not_slide_has_no_colour_of_a_displacement(grid: xr.Dataset) -> None:
+    figure = grid.slipsweep.chart("contours", at={"theta": 6, "mu_s": 0.45})
+    figure.draw_without_rendering()
+    axes = figure.axes[0]
+    threshold = slipsweep.friction_parameters(6.0, 0.45, 1.0).yield_acceleration.item()
+    covers = [one for one in axes.collections if one.get_zorder() == 1.05]
+    low, high = covers[0].get_paths()[0].get_extents().intervaly
+    assert low <= axes.get_ylim()[0]
+    assert high == pytest.approx(threshold, rel=1e-12)
+    np.testing.assert_array_equal(covers[0].get_facecolor(), [[1, 1, 1, 1]])
+    assert min(style.COLOURS(0)[:3]) < 0.9  # not the white of no sliding
+    assert legend(figure)[0] == legend(grid.slipsweep.chart("modes"))[0] == "no sliding"
+
+
+@pytest.mark.parametrize("kind", ["contours", "newmark"])
+def test_contours_leave_them_out_too(lined: xr.Dataset, kind: str) -> None:
+    figure = lined.slipsweep.chart(kind, x="frequency", at={"theta": 14, "mu_s": 0.25})
+    (patch,) = named(figure, "not_recoupled")
+    for lines in named(figure, "contours"):
+        for segment in (one for segments in lines.allsegs for one in segments):
+            assert not inside(patch, segment).any()
+
+
+def test_ratio_to_newmark_is_that_of_a_direct_sweep(lined: xr.Dataset) -> None:
+    at = {"mu_s": 0.25, "frequency": 1}
+    figure = lined.slipsweep.chart("contours", x="theta", at=at)
+    given: dict[str, Any] = {
+        "theta": lined.theta.values,
+        "mu_s": 0.25,
+        "amplitude": lined.amplitude.values,
+    }
+    ours, theirs = (
+        slipsweep.sweep(**given, frequency=1.0, model=model, excitation=LINED_SINE)
+        for model in ("mendez", "newmark")
+    )
+    kept = slipsweep.flags(ours).not_recoupled.values == 0
+    ratio = ours.permanent_displacement.values / theirs.permanent_displacement.values.clip(1e-300)
+    ratio = ratio[kept & (theirs.permanent_displacement.values > 0) & (ratio > 0)]
+    low, middle, high = np.quantile(ratio, (0.05, 0.5, 0.95))
+    text = f"median {middle:.3g}; 90 % of the sliding cells shown lie between {low:.3g} and {high:.3g}."
+    assert text in caption(figure)

@@ -1,0 +1,167 @@
+"""The page in Chromium: it shows the dataset, and runs nothing of a file."""
+
+import json
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from slipsweep import (
+    Sine,
+    SlidingMode,
+    Validity,
+    read_suite,
+    simulate,
+    sweep,
+)
+from slipsweep.explore.page import write_page
+from slipsweep.model.variables import CAUTIONS, FLAG_KIND_TEXT, VALUELESS, FlagKind, flags_of
+from tests.support.browser import FOUND, chosen, move, point, show, text_of, wait_for
+from tests.support.pages import AXES, SUITE
+
+
+def test_page_loads_without_errors_and_without_network(opened: Any) -> None:
+    move(opened, 0, 1)
+    point(opened, 0.3, 0.2, click=True)
+    wrong = [
+        entry for entry in opened.get_log("browser") if entry["level"] not in ("INFO", "DEBUG")
+    ]
+    assert wrong == []
+    events = [json.loads(entry["message"])["message"] for entry in opened.get_log("performance")]
+    sent = [event["params"] for event in events if event["method"] == "Network.requestWillBeSent"]
+    # the browser's own start page, which it may be loading still, is not ours
+    urls = [
+        request["request"]["url"]
+        for request in sent
+        if not request["documentURL"].startswith("chrome")
+    ]
+    assert urls
+    assert {url.split(":")[0] for url in urls} <= {"file", "data", "blob"}
+
+
+def test_readout_is_the_dataset(opened: Any, result: Path) -> None:
+    with xr.open_dataset(result, mask_and_scale=False) as data:
+        seen = set()
+        for theta, mu_s, x, y in (
+            (0, 0, 0.1, 0.1),
+            (1, 0, 0.92, 0.6),
+            (1, 0, 0.5, 0.75),
+            (1, 0, 0.2, 0.97),
+            (1, 1, 0.33, 0.05),
+            (2, 0, 0.5, 0.5),
+        ):
+            move(opened, theta, mu_s)
+            point(opened, x, y)
+            wait_for(
+                opened,
+                "document.getElementById('readout-title').textContent === 'Cell under the pointer'",
+            )
+            places = (text_of(opened, f"readout-{name}") for name in ("amplitude", "frequency"))
+            amplitude, frequency = (float(text.split()[0]) for text in places)
+            # the cell is where the pointer is: axes from half a cell before the first value to half
+            # a cell after
+            assert abs(amplitude - (12.25 - 11.5 * y)) <= 0.27
+            step = math.log(50) / 17
+            assert abs(math.log(frequency / 0.2) - (-0.5 + 18 * x) * step) <= 0.54 * step
+            cell = data.sel(theta=AXES[0][theta], mu_s=AXES[1][mu_s]).sel(
+                amplitude=amplitude, frequency=frequency, method="nearest"
+            )
+            for name in ("permanent_displacement", "newmark_displacement"):
+                expected = float(cell[name])
+                text = text_of(opened, f"readout-{name}")
+                if math.isnan(expected):
+                    assert text == "no value"
+                else:
+                    metres = float(text.split()[0]) * {"mm": 1e-3, "m": 1.0}[text.split()[1]]
+                    assert metres == pytest.approx(expected, rel=5.1e-4, abs=1e-30)
+            flags = [
+                [f"{kind}: {FLAG_KIND_TEXT[kind]}", f"{(flag.name or '').lower()}: {flag.text}"]
+                for kind in FlagKind
+                for flag in Validity(int(cell.validity)) & flags_of(kind)
+            ]
+            rows = opened.execute_script(
+                "return [...document.querySelectorAll('dd.flag')]"
+                ".map((dd) => [dd.previousSibling.textContent, dd.textContent])"
+            )
+            assert rows == flags
+            mode = SlidingMode(int(cell.sliding_mode)).name.lower()
+            assert text_of(opened, "readout-mode") == mode
+            seen |= {mode, *(flag.split(":")[0] for _, flag in flags)}
+        assert {"stuck", "stick_slip", "continuous", "missing", "statically_unstable"} <= seen
+
+
+def test_the_page_starts_on_a_sound_cell(opened: Any, result: Path) -> None:
+    index = chosen(opened)
+    with xr.open_dataset(result, mask_and_scale=False) as data:
+        cell = data.isel(dict(zip(("theta", "mu_s", "amplitude", "frequency"), index, strict=True)))
+        assert cell.permanent_displacement > 0
+        assert not Validity(int(cell.validity)) & (CAUTIONS | VALUELESS)
+
+
+def test_nothing_of_a_file_runs_in_the_page(browser: Any, tmp_path: Path) -> None:
+    """A dimension's and a motion's names, a title: all are text."""
+    name = "<img src=x onerror=document.title='run'>"
+    label = "<!--<script>document.title='run'"
+    suite = read_suite([SUITE / f"{one}_H1.AT2" for one in ("rock-far", "rock-near")])
+    data = sweep(5, [0.1, 0.2], amplitude=[2.0, 4.0], excitation=suite)
+    data = data.assign_coords(motion=[label, "</script><script>document.title='run'</script>"])
+    data = data.expand_dims({name: 2}).assign_attrs(title=name, friction_inputs=label)
+    data.to_zarr(tmp_path / "own.zarr", zarr_format=3)
+    write_page(tmp_path / "own.zarr", tmp_path / "page.html")
+    browser.get_log("browser")
+    show(browser, tmp_path / "page.html")
+    assert browser.title == name
+    assert label in text_of(browser, "slider-motion")
+    assert browser.execute_script("return document.querySelectorAll('img').length") == 0
+    assert [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"] == []
+    # the policy stops a script that gets into the page all the same
+    browser.execute_script(
+        "const s = document.createElement('script'); s.textContent = 'document.title = 1'; document.body.append(s)"
+    )
+    assert browser.title == name
+
+
+def test_history_is_of_the_very_cell_that_is_named(opened: Any) -> None:
+    move(opened, 1, 0)
+    point(opened, 0.4, 0.25, click=True)
+    index = chosen(opened)
+    assert chosen(opened, "history-note") == index
+    theta, mu_s, amplitude, frequency = (
+        float(axis[at]) for axis, at in zip(AXES, index, strict=True)
+    )
+    assert (theta, mu_s) == (5, 0.3)
+    assert text_of(opened, "history-note").endswith("the first 3 of 4 cycles.")
+    drawn = opened.execute_script(
+        FOUND + "const d = found('history').data; return [[...d.t], [...d.v], [...d.u]]"
+    )
+    expected = simulate(
+        theta, mu_s, amplitude, frequency, times=drawn[0], excitation=Sine(cycles=4)
+    )
+    assert drawn[0][-1] == pytest.approx(3 / frequency, rel=1e-12)
+    for values, exact in (
+        (drawn[1], expected.relative_velocity),
+        (drawn[2], expected.relative_displacement * 1000),
+    ):
+        assert float(exact.max()) > 0.0
+        np.testing.assert_allclose(values, exact, rtol=0, atol=float(exact.max()) / 30_000)
+    (said,) = re.findall(r"at the end ([\d.]+ m?m)\.$", text_of(opened, "history-summary"))
+    assert said == f"{drawn[2][-1]:.{len(said.split()[0].partition('.')[2])}f} mm"
+
+
+def test_map_colours_are_the_dataset(opened: Any) -> None:
+    """The picture itself: every pixel has the displacement of the cell it lies in."""
+    move(opened, 1, 0)
+    shape, values = opened.execute_script(
+        FOUND + "const d = found('colours').data.image[0]; return [d.shape, [...d]]"
+    )
+    in_g, top = opened.execute_script(FOUND + "return [found('map_g').end, found('y_range').end]")
+    assert in_g * 9.81 == pytest.approx(top)
+    seen = np.reshape(np.array(values, float), shape)  # from below
+    mm = 1000 * sweep(5, 0.3, *AXES[2:], excitation=Sine(cycles=4)).permanent_displacement.values
+    rows = ((np.arange(23) + 0.5) * seen.shape[0] / 23).astype(int)
+    columns = ((np.arange(18) + 0.5) * seen.shape[1] / 18).astype(int)
+    np.testing.assert_allclose(seen[np.ix_(rows, columns)], np.where(mm > 0, mm, np.nan), rtol=1e-6)

@@ -1,0 +1,43 @@
+"""Helpers of the tests of charts: what is drawn in a figure, and the grids that are drawn."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+import slipsweep
+from slipsweep.charts import kinds
+
+SINE = slipsweep.Sine(cycles=5)
+AMPLITUDES = np.linspace(0.5, 13.5, 53)
+FREQUENCIES = np.geomspace(0.2, 20, 25)
+
+SWEEP_KINDS = list(kinds.kinds_of("sweep"))
+
+#: A lined slope: the interface is weak, the block does not come to rest, and ends upslope.
+LINED_SINE = slipsweep.Sine(cycles=15)
+
+
+def named(figure: Figure, gid: str) -> list[Any]:
+    """The artists of a chart's first axes with a name."""
+    return [child for child in figure.axes[0].get_children() if child.get_gid() == gid]
+
+
+def labelled(figure: Figure, begin: str) -> list[Any]:
+    """Lines of a chart's first axes whose label begins so."""
+    return [line for line in figure.axes[0].lines if str(line.get_label()).startswith(begin)]
+
+
+def legend(figure: Figure) -> list[str]:
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def caption(figure: Figure) -> str:
+    """A caption as one line."""
+    return " ".join(figure.get_supxlabel().split())
+
+
+def inside(area: Any, cells: Any) -> Any:
+    """Which points a filled area covers, those on its edge among them."""
+    (path,) = area.get_paths()
+    return path.contains_points(cells, radius=1e-9) | path.contains_points(cells, radius=-1e-9)
