@@ -107,12 +107,12 @@ def step_solver(problem: Problem, options: physics.Options, polarity: float) -> 
     else:
         wave = cutting.wave_of(problem.excitation)
         on_piece = 0
+    steps = step.steps_of(wave, rule, count, on_piece)
     no_history = step.history_of(np.empty(0), np.empty(0))
 
     def solve(cells: np.ndarray, results: np.ndarray) -> None:
         blocks = step.blocks_of(rule, count, on_piece)
-        workspace = np.empty(2 * max(count, on_piece) + 3)
-        step.solve_steps(cells, options, wave, blocks, workspace, no_history, results)
+        step.solve_steps(cells, options, wave, blocks, steps, no_history, results)
 
     return Solver(solve, ROWS, step.STEP_CELL)
 

@@ -47,8 +47,23 @@ DOWN = 6  # Newmark's block, V > 0: Ü = Üy
 UP = 7  # Newmark's block, V < 0: Ü = −Üy,up
 
 
+class Slide(NamedTuple):
+    """What Ü depends on in a phase, besides Üg and V; `seconds` is the time of a unit of phase."""
+
+    phase: int
+    held: float  # b
+    yield_acceleration: float
+    upslope_yield_acceleration: float
+    mu_s: float
+    delta_mu: float
+    decay_rate: float
+    tan_theta: float
+    g: float
+    seconds: float
+
+
 class Law(NamedTuple):
-    """A friction law: μ(block, Üg, v), with v in m/s, and whether it depends on v."""
+    """A friction law: μ(slide, Üg, v), with v in m/s, and whether it depends on v."""
 
     friction: Callable[..., float]
     knows_velocity: bool
@@ -62,38 +77,41 @@ STEP_CELL = np.dtype(
 
 #: A block: its parameters, how it is stepped, and its motion up to now.
 BLOCK = np.dtype(
-    [
-        ("amplitude", "f8"),  # A, or the factor on a record
-        ("tan_theta", "f8"),
-        ("mu_s", "f8"),
-        ("delta_mu", "f8"),
-        ("decay_rate", "f8"),
-        ("yield_acceleration", "f8"),
-        ("upslope_yield_acceleration", "f8"),
-        ("g", "f8"),
-        ("seconds", "f8"),
-        ("mode", "i8"),  # `SlidingMode`; under a record that of the pulse
-        ("rise", "i8"),
-        ("recoupling", "i8"),
-        ("rule", "i8"),
-        ("steps", "i8"),  # in 2π of phase
-        ("steps_on_piece", "i8"),  # under a record; else 0
-        ("phase", "i8"),
-        ("in_pulse", "i8"),  # from Üg = Üy to the end of the positive half wave
-        ("held", "f8"),  # b
-        ("velocity", "f8"),  # V
-        ("displacement", "f8"),  # W
-        ("largest_velocity", "f8"),
-        ("least_velocity", "f8"),
-        ("largest_displacement", "f8"),
-        ("smallest_displacement", "f8"),
-        ("onset", "f8"),  # when the slide began, and the rest of the piece from there
-        ("growth", "f8"),
-        ("slips", "f8"),
-        ("stick_slip_pulses", "f8"),
-        ("continuous_pulses", "f8"),
-        ("validity", "i8"),
-    ]
+    (
+        np.record,
+        [
+            ("amplitude", "f8"),  # A, or the factor on a record
+            ("tan_theta", "f8"),
+            ("mu_s", "f8"),
+            ("delta_mu", "f8"),
+            ("decay_rate", "f8"),
+            ("yield_acceleration", "f8"),
+            ("upslope_yield_acceleration", "f8"),
+            ("g", "f8"),
+            ("seconds", "f8"),
+            ("mode", "i8"),  # `SlidingMode`; under a record that of the pulse
+            ("rise", "i8"),
+            ("recoupling", "i8"),
+            ("rule", "i8"),
+            ("steps", "i8"),  # in 2π of phase
+            ("steps_on_piece", "i8"),  # under a record; else 0
+            ("phase", "i8"),
+            ("in_pulse", "i8"),  # from Üg = Üy to the end of the positive half wave
+            ("held", "f8"),  # b
+            ("velocity", "f8"),  # V
+            ("displacement", "f8"),  # W
+            ("largest_velocity", "f8"),
+            ("least_velocity", "f8"),
+            ("largest_displacement", "f8"),
+            ("smallest_displacement", "f8"),
+            ("onset", "f8"),  # when the slide began, and the rest of the piece from there
+            ("growth", "f8"),
+            ("slips", "f8"),
+            ("stick_slip_pulses", "f8"),
+            ("continuous_pulses", "f8"),
+            ("validity", "i8"),
+        ],
+    )
 )
 
 
@@ -105,6 +123,13 @@ class History(NamedTuple):
     velocity: np.ndarray
     displacement: np.ndarray
     done: np.ndarray
+
+
+class Steps(NamedTuple):
+    """The base's motion at the ends of all steps, with Simpson's rule in their middles, too."""
+
+    wave: np.ndarray  # (points,) Üg over the amplitude, piece after piece
+    first: np.ndarray  # (pieces + 1,) where the points of a piece begin
 
 
 #: From its onset to the end of the piece a slide takes N/64 steps at least, later a step is at most
@@ -119,66 +144,107 @@ POINTS_OF_RISE = 32
 
 
 @registered
-def exponential_friction(block: np.record, ground: float, velocity: float) -> float:
+def exponential_friction(slide: Slide, ground: float, velocity: float) -> float:
     """Eq. 6, the friction law of the paper, which does not depend on the velocity."""
-    return eq.friction_coefficient(ground, block.mu_s, block.delta_mu, block.decay_rate, block.g)
+    return eq.friction_coefficient(ground, slide.mu_s, slide.delta_mu, slide.decay_rate, slide.g)
 
 
 # ------------------------------------------------------------------ one step
 
 
 @inlined
-def eq4_rate(law: Law, block: np.record, ground: float, velocity: float) -> float:
-    """Üg − Ü with Ü by Eq. 4."""
-    friction = law.friction(block, ground, velocity * block.seconds)
-    return eq.relative_acceleration(ground, friction, block.mu_s, block.tan_theta, block.g)
+def slide_of(block: np.record) -> Slide:
+    """What Ü of a block depends on in its phase."""
+    return Slide(
+        block.phase,
+        block.held,
+        block.yield_acceleration,
+        block.upslope_yield_acceleration,
+        block.mu_s,
+        block.delta_mu,
+        block.decay_rate,
+        block.tan_theta,
+        block.g,
+        block.seconds,
+    )
 
 
 @inlined
-def rate(law: Law, block: np.record, ground: float, velocity: float) -> float:
-    """Rate of V, Üg − Ü, in the phase of the block; Eq. 12 takes no steps (`attenuate`)."""
-    if block.phase == HELD or block.phase == HELD_ON:
-        return ground - block.held
-    if block.phase == DOWN:
-        return ground - block.yield_acceleration
-    if block.phase == UP:
-        return ground + block.upslope_yield_acceleration
-    return eq4_rate(law, block, ground, velocity)
+def eq4_rate(law: Law, slide: Slide, ground: float, velocity: float) -> float:
+    """Üg − Ü with Ü by Eq. 4."""
+    friction = law.friction(slide, ground, velocity * slide.seconds)
+    return eq.relative_acceleration(ground, friction, slide.mu_s, slide.tan_theta, slide.g)
+
+
+@inlined
+def rate(law: Law, slide: Slide, ground: float, velocity: float) -> float:
+    """Rate of V, Üg − Ü, in a phase; Eq. 12 takes no steps (`attenuate`)."""
+    if slide.phase == HELD or slide.phase == HELD_ON:
+        return ground - slide.held
+    if slide.phase == DOWN:
+        return ground - slide.yield_acceleration
+    if slide.phase == UP:
+        return ground + slide.upslope_yield_acceleration
+    return eq4_rate(law, slide, ground, velocity)
+
+
+@scalar
+def eq4_rate_at_rest(law: Law, block: np.record, ground: float) -> float:
+    """Üg − Ü with Ü by Eq. 4 and V = 0: positive where a block at rest begins to slide."""
+    return eq4_rate(law, slide_of(block), ground, 0.0)
+
+
+@scalar
+def eq4_of(law: Law, block: np.record, ground: float) -> float:
+    """Ü by Eq. 4 at the velocity of the block."""
+    return ground - eq4_rate(law, slide_of(block), ground, block.velocity)
 
 
 @inlined
 def advance(
-    law: Law, block: np.record, middle: float, end: float, h: float, first_rate: float
+    law: Law,
+    slide: Slide,
+    rule: int,
+    ground: tuple[float, float, float],
+    h: float,
+    velocity: float,
+    first_rate: float,
 ) -> tuple[float, float, float, float]:
-    """Take a step h: return the gains of V and W, and the rates in its middle and at its end.
+    """Take a step h from V: return the gains of V and W, and the rates in its middle and at its end.
 
-    `middle` and `end` are Üg there, `first_rate` is the rate at the start.
+    Üg is at the start, the middle and the end of the step; `first_rate` is the rate at the start.
     """
-    velocity = block.velocity
-    if block.rule == RECTANGLE:  # Euler's
+    middle = ground[1]
+    end = ground[2]
+    again = law.knows_velocity  # otherwise two rates at one Üg are the same
+    if rule == RECTANGLE:  # Euler's
         gained = first_rate * h  # V += (Üg − Ü) h
         moved = (velocity + 0.5 * gained) * h
-        last_rate = rate(law, block, end, velocity + gained)
+        last_rate = rate(law, slide, end, velocity + gained)
         return gained, moved, 0.5 * (first_rate + last_rate), last_rate
-    if block.rule == TRAPEZOID:  # Heun's
-        end_rate = rate(law, block, end, velocity + first_rate * h)
+    if rule == TRAPEZOID:  # Heun's
+        end_rate = rate(law, slide, end, velocity + first_rate * h)
         gained = 0.5 * (first_rate + end_rate) * h
         moved = (velocity + (2.0 * first_rate + end_rate) * h / 6.0) * h
-        last_rate = rate(law, block, end, velocity + gained)
+        last_rate = rate(law, slide, end, velocity + gained) if again else end_rate
         return gained, moved, 0.5 * (first_rate + last_rate), last_rate
     # Runge's and Kutta's of order 4, which is Simpson's rule where friction does not depend on V
-    early_rate = rate(law, block, middle, velocity + 0.5 * h * first_rate)
-    middle_rate = rate(law, block, middle, velocity + 0.5 * h * early_rate)
-    end_rate = rate(law, block, end, velocity + h * middle_rate)
+    early_rate = rate(law, slide, middle, velocity + 0.5 * h * first_rate)
+    middle_rate = early_rate
+    if again:
+        middle_rate = rate(law, slide, middle, velocity + 0.5 * h * early_rate)
+    end_rate = rate(law, slide, end, velocity + h * middle_rate)
     gained = (first_rate + 2.0 * (early_rate + middle_rate) + end_rate) * h / 6.0
     moved = (velocity + (first_rate + early_rate + middle_rate) * h / 6.0) * h
-    return gained, moved, middle_rate, rate(law, block, end, velocity + gained)
+    last_rate = rate(law, slide, end, velocity + gained) if again else end_rate
+    return gained, moved, middle_rate, last_rate
 
 
 @inlined
 def excess(
     law: Law,
-    block: np.record,
+    slide: Slide,
+    monotone: bool,
     rises: bool,
     ground: tuple[float, float, float],
     rates: tuple[float, float, float],
@@ -190,14 +256,14 @@ def excess(
     it, and with the monotone rise it no longer follows Eq. 4 where that falls.  Üg and the rates
     are those at the start, the middle and the end of the step.
     """
-    if block.phase == CONTINUOUS:
+    if slide.phase == CONTINUOUS:
         return -1.0
-    if block.phase == UP:
+    if slide.phase == UP:
         return velocity
-    if rises and block.phase == HELD:
-        eq4 = ground[2] - eq4_rate(law, block, ground[2], velocity)
-        return max(-velocity, eq4 - block.held)
-    if rises and block.phase == FOLLOWS and block.rise == MONOTONE:
+    if rises and slide.phase == HELD:
+        eq4 = ground[2] - eq4_rate(law, slide, ground[2], velocity)
+        return max(-velocity, eq4 - slide.held)
+    if rises and slide.phase == FOLLOWS and monotone:
         first = ground[0] - rates[0]
         middle = ground[1] - rates[1]
         last = ground[2] - rates[2]
@@ -242,29 +308,6 @@ def ground_in_step(
 
 
 @scalar
-def sample_ground(block: np.record, piece: Piece, half: float, ground: np.ndarray) -> None:
-    """Write Üg at the ends and middles of all steps on a piece, `half` a step apart."""
-    # counted from the anchor: two pieces that mirror each other have the same values
-    first = 0 if piece.begin == 0.0 else 1 - ground.size
-    ground[:] = 0.0
-    for k in range(piece.degree - 1, -1, -1):
-        coefficient = piece.coefficients[k]
-        for j in range(ground.size):
-            ground[j] = (ground[j] + coefficient) * ((first + j) * half)
-    for j in range(ground.size):
-        ground[j] = math.copysign(block.amplitude * (piece.top + ground[j]), piece.top)
-
-
-@inlined
-def steps_on(block: np.record, piece: Piece) -> int:
-    """Return the number of equal steps on a piece."""
-    if block.steps_on_piece > 0:
-        return block.steps_on_piece
-    length = piece.finish - piece.begin
-    return max(math.ceil(length / (2.0 * math.pi) * block.steps - 1e-9), 1)
-
-
-@scalar
 def place_of(block: np.record, piece: Piece, level: float) -> float:
     """Return τ at which |Üg| reaches a level on a piece on which it grows (the end, if it does not)."""
     if block.amplitude * abs(piece.first) >= level:
@@ -286,7 +329,9 @@ def advance_from(
 ) -> tuple[tuple[float, float, float], float, float, float, float]:
     """Take a step from τ: return Üg in it, and what `advance` returns."""
     ground = ground_in_step(block, piece, tau, h)
-    gained, moved, middle_rate, last_rate = advance(law, block, ground[1], ground[2], h, first_rate)
+    gained, moved, middle_rate, last_rate = advance(
+        law, slide_of(block), block.rule, ground, h, block.velocity, first_rate
+    )
     return ground, gained, moved, middle_rate, last_rate
 
 
@@ -318,7 +363,7 @@ def begin_stick_slip(
     law: Law, block: np.record, rises: bool, ground: float, time: float, growth: float
 ) -> None:
     """t1: begin to slide with b = max(Üy, Eq. 4), with the literal rise b by Eq. 4."""
-    eq4 = ground - eq4_rate(law, block, ground, block.velocity)
+    eq4 = eq4_of(law, block, ground)
     if block.velocity == 0.0:
         eq4 = min(eq4, ground)  # where Eq. 4 falls below Üg they are equal but for rounding
     follows = block.rise == LITERAL or eq4 >= block.yield_acceleration
@@ -349,36 +394,41 @@ def end_phase(block: np.record, eq4: float) -> None:
 
 
 @scalar
-def wait(
-    law: Law, block: np.record, piece: Piece, rises: bool, now: float, tau: float, end: float
-) -> float:
-    """Return τ at which a block at rest begins to slide, `end` if it does not before.
+def wait_for_newmark(block: np.record, piece: Piece, now: float, tau: float) -> float:
+    """Return τ at which Newmark's block at rest begins to slide: where Üg exceeds what it resists."""
+    down = piece.top > 0.0
+    limit = block.yield_acceleration if down else block.upslope_yield_acceleration
+    if block.amplitude * abs(piece.top) <= limit:
+        return piece.finish
+    if abs(piece.last) > abs(piece.first):
+        tau = max(tau, place_of(block, piece, limit))
+    elif abs(ground_at(block, piece, tau)) <= limit:
+        return piece.finish
+    begin_slide(block, DOWN if down else UP, now + tau, piece.finish - tau)
+    return tau
 
-    Newmark's block slides where Üg is beyond what it resists; the paper's, beyond Üy, where Eq. 4
-    is below Üg while that rises.
+
+@scalar
+def wait(law: Law, block: np.record, piece: Piece, now: float, tau: float, end: float) -> float:
+    """Return τ at which the paper's block begins to slide while Üg rises beyond Üy: t1.
+
+    That is where Eq. 4 is below Üg, and `end`, if that is not so at the end, either.
     """
-    ground = ground_at(block, piece, tau)
-    ahead = ground_at(block, piece, end)
-    if block.rise == NEWMARK:
-        if max(ground, ahead) > block.yield_acceleration:
-            begin_slide(block, DOWN, now + tau, piece.finish - tau)
-            return tau
-        if min(ground, ahead) < -block.upslope_yield_acceleration:
-            begin_slide(block, UP, now + tau, piece.finish - tau)
-            return tau
-        return end
-    if not rises or max(eq4_rate(law, block, ground, 0.0), eq4_rate(law, block, ahead, 0.0)) <= 0.0:
-        return end
+    at_end = eq4_rate_at_rest(law, block, ground_at(block, piece, end))
     low = tau
-    high = tau if eq4_rate(law, block, ground, 0.0) > 0.0 else end
+    high = end
+    if eq4_rate_at_rest(law, block, ground_at(block, piece, tau)) > 0.0:
+        high = tau
+    elif at_end <= 0.0:
+        return end
     while low < 0.5 * (low + high) < high:
         middle = 0.5 * (low + high)
-        if eq4_rate(law, block, ground_at(block, piece, middle), 0.0) > 0.0:
+        if eq4_rate_at_rest(law, block, ground_at(block, piece, middle)) > 0.0:
             high = middle
         else:
             low = middle
     ground = ground_at(block, piece, high)
-    begin_stick_slip(law, block, rises, ground, now + high, piece.finish - high)
+    begin_stick_slip(law, block, True, ground, now + high, piece.finish - high)
     return high
 
 
@@ -456,7 +506,9 @@ def excess_after(
     """Return `excess` after a step from τ."""
     ground, gained, _, middle_rate, last_rate = advance_from(law, block, piece, tau, h, first_rate)
     rates = (first_rate, middle_rate, last_rate)
-    return excess(law, block, rises, ground, rates, block.velocity + gained)
+    return excess(
+        law, slide_of(block), block.rise == MONOTONE, rises, ground, rates, block.velocity + gained
+    )
 
 
 @scalar
@@ -471,28 +523,139 @@ def step_to_end_of_phase(
 ) -> float:
     """Return the step, at most h, after which the phase ends.
 
-    By false position; the value at the end that stays is halved (the Illinois rule).
+    By false position; the value at an end that stays twice is halved (the Illinois rule).
     """
+    nearest = 1e-14 * h
     low = 0.0
     high = h
     below = min(excess_after(law, block, piece, rises, tau, low, first_rate), -1e-300)
     above = excess_after(law, block, piece, rises, tau, high, first_rate)
-    while high - low > 4e-16 * h:
+    side = 0
+    while high - low > 2.0 * nearest:
         new = high - above * ((high - low) / (above - below))
-        if not low < new < high:
-            new = 0.5 * (low + high)
-            if not low < new < high:
-                break
+        new = min(max(new, low + nearest), high - nearest)
         value = excess_after(law, block, piece, rises, tau, new, first_rate)
         if value > 0.0:
             high = new
             above = value
-            below *= 0.5
+            below *= 0.5 if side == 1 else 1.0
+            side = 1
         else:
             low = new
             below = value
-            above *= 0.5
+            above *= 0.5 if side == -1 else 1.0
+            side = -1
     return high
+
+
+@scalar
+def take_whole_steps(
+    law: Law,
+    block: np.record,
+    rises: bool,
+    h: float,
+    points: np.ndarray,
+    steps: int,
+    first_rate: float,
+) -> tuple[int, float]:
+    """Take whole steps up to one in which a phase ends or V turns; return how many, and the rate."""
+    slide = slide_of(block)
+    monotone = block.rise == MONOTONE
+    rule = block.rule
+    amplitude = block.amplitude
+    velocity = block.velocity
+    displacement = block.displacement
+    largest = block.largest_velocity
+    least = block.least_velocity
+    each = 2 if rule == SIMPSON else 1
+    taken = 0
+    while taken < steps:
+        start = amplitude * points[each * taken]
+        end = amplitude * points[each * (taken + 1)]
+        middle = amplitude * points[2 * taken + 1] if each == 2 else 0.5 * (start + end)
+        ground = (start, middle, end)
+        gained, moved, middle_rate, last_rate = advance(
+            law, slide, rule, ground, h, velocity, first_rate
+        )
+        rates = (first_rate, middle_rate, last_rate)
+        turns = first_rate < 0.0 < last_rate or last_rate < 0.0 < first_rate
+        if turns or excess(law, slide, monotone, rises, ground, rates, velocity + gained) > 0.0:
+            break
+        velocity += gained
+        displacement += moved
+        largest = max(largest, velocity)
+        least = min(least, velocity)
+        first_rate = last_rate
+        taken += 1
+    if taken > 0 and block.phase == FOLLOWS:
+        block.held = amplitude * points[each * taken] - first_rate
+    block.velocity = velocity
+    block.displacement = displacement
+    block.largest_velocity = largest
+    block.least_velocity = least
+    return taken, first_rate
+
+
+@scalar
+def take_step(
+    law: Law,
+    block: np.record,
+    piece: Piece,
+    rises: bool,
+    now: float,
+    tau: float,
+    h: float,
+    first_rate: float,
+    history: History,
+) -> tuple[float, float]:
+    """Take a step h from τ, or a part of it up to the end of the phase; return the step and the rate.
+
+    The rate is NaN where another phase follows.
+    """
+    ground, gained, moved, middle_rate, last_rate = advance_from(
+        law, block, piece, tau, h, first_rate
+    )
+    rates = (first_rate, middle_rate, last_rate)
+    ends = (
+        excess(
+            law,
+            slide_of(block),
+            block.rise == MONOTONE,
+            rises,
+            ground,
+            rates,
+            block.velocity + gained,
+        )
+        > 0.0
+    )
+    turning = block.velocity
+    if first_rate < 0.0 < last_rate or last_rate < 0.0 < first_rate:
+        # V is largest or least in the step, and may have been 0
+        until, turning = turning_point(block.velocity, h, first_rate, middle_rate, last_rate)
+        stops = turning > 0.0 if block.phase == UP else turning < 0.0
+        if stops and not ends and block.phase != CONTINUOUS:
+            ends = True
+            h = until
+    if ends:
+        grows = first_rate < 0.0 if block.phase == UP else first_rate > 0.0
+        if block.velocity == 0.0 and not grows:
+            rest(block)  # rounding has made it slide
+            return h, math.nan
+        h = step_to_end_of_phase(law, block, piece, rises, tau, h, first_rate)
+        ground, gained, moved, _, last_rate = advance_from(law, block, piece, tau, h, first_rate)
+        turning = block.velocity
+    if history.phases.size > 0:
+        sample_step(law, block, piece, now, tau, h, first_rate, history)
+    block.velocity += gained
+    block.displacement += moved
+    block.largest_velocity = max(block.largest_velocity, block.velocity, turning)
+    block.least_velocity = min(block.least_velocity, block.velocity, turning)
+    if block.phase == FOLLOWS:
+        block.held = ground[2] - last_rate
+    if ends:
+        end_phase(block, ground[2] - last_rate)
+        return h, math.nan
+    return h, last_rate
 
 
 @scalar
@@ -504,74 +667,48 @@ def step_along(
     now: float,
     tau: float,
     finish: float,
-    workspace: np.ndarray,
+    points: np.ndarray,
     history: History,
 ) -> None:
     """Go from τ to `finish` on a piece, step by step; `now` is the time of τ = 0."""
-    count = steps_on(block, piece)
+    each = 2 if block.rule == SIMPSON else 1
+    count = (points.size - 1) // each
     whole = (piece.finish - piece.begin) / count
-    samples = workspace[: 2 * count + 1]
-    sample_ground(block, piece, 0.5 * whole, samples)
+    # steps on the piece that are whole before `finish`
+    last = count if finish == piece.finish else int((finish - piece.begin) / whole)
     first_rate = math.nan  # where it is not known from the step before
-    for j in range(min(max(int((tau - piece.begin) / whole), 0), count - 1), count):
+    j = min(max(int((tau - piece.begin) / whole), 0), count - 1)
+    while tau < finish:
+        while j + 1 < count and tau >= piece.begin + (j + 1) * whole:
+            j += 1
         begin = piece.begin + j * whole
-        end = finish if j + 1 == count else min(piece.begin + (j + 1) * whole, finish)
-        while tau < end:
-            if block.phase == STUCK:
-                tau = wait(law, block, piece, rises, now, tau, end)
-                first_rate = math.nan
-                continue
-            since = now + tau - block.onset
-            longest = max(GROWTH_SHARE * block.growth, TIME_SHARE * since) / block.steps
-            h = min(max(longest, SHORTEST_STEP), end - tau)
-            middle = samples[2 * j + 1]
-            if block.rule != SIMPSON:
-                middle = 0.5 * (samples[2 * j] + samples[2 * j + 2])
-            ground = (samples[2 * j], middle, samples[2 * j + 2])
-            if tau > begin or h < 0.999999999 * whole:
-                ground = ground_in_step(block, piece, tau, h)
-            if math.isnan(first_rate):
-                first_rate = rate(law, block, ground[0], block.velocity)
-
-            gained, moved, middle_rate, last_rate = advance(
-                law, block, ground[1], ground[2], h, first_rate
+        end = min(piece.begin + (j + 1) * whole, finish) if j + 1 < count else finish
+        if block.phase == STUCK:
+            first_rate = math.nan
+            if block.rise == NEWMARK:
+                tau = wait_for_newmark(block, piece, now, tau)
+            elif rises and ground_at(block, piece, finish) >= block.yield_acceleration:
+                if ground_at(block, piece, tau) < block.yield_acceleration:
+                    tau = place_of(block, piece, block.yield_acceleration)
+                tau = wait(law, block, piece, now, tau, max(tau, end))
+            else:
+                return
+            continue
+        since = now + tau - block.onset
+        longest = max(GROWTH_SHARE * block.growth, TIME_SHARE * since) / block.steps
+        if math.isnan(first_rate):
+            first_rate = rate(law, slide_of(block), ground_at(block, piece, tau), block.velocity)
+        if tau == begin and longest >= whole and j < last and history.phases.size == 0:
+            taken, first_rate = take_whole_steps(
+                law, block, rises, whole, points[each * j :], last - j, first_rate
             )
-            rates = (first_rate, middle_rate, last_rate)
-            ends = excess(law, block, rises, ground, rates, block.velocity + gained) > 0.0
-            turning = block.velocity
-            if first_rate < 0.0 < last_rate or last_rate < 0.0 < first_rate:
-                # V is largest or least in the step, and may have been 0
-                until, turning = turning_point(
-                    block.velocity, h, first_rate, middle_rate, last_rate
-                )
-                stops = turning > 0.0 if block.phase == UP else turning < 0.0
-                if stops and not ends and block.phase != CONTINUOUS:
-                    ends = True
-                    h = until
-            if ends:
-                grows = first_rate < 0.0 if block.phase == UP else first_rate > 0.0
-                if block.velocity == 0.0 and not grows:
-                    rest(block)  # rounding has made it slide
-                    tau += h
-                    continue
-                h = step_to_end_of_phase(law, block, piece, rises, tau, h, first_rate)
-                ground, gained, moved, _, last_rate = advance_from(
-                    law, block, piece, tau, h, first_rate
-                )
-                turning = block.velocity
-            if history.phases.size > 0:
-                sample_step(law, block, piece, now, tau, h, first_rate, history)
-            block.velocity += gained
-            block.displacement += moved
-            block.largest_velocity = max(block.largest_velocity, block.velocity, turning)
-            block.least_velocity = min(block.least_velocity, block.velocity, turning)
-            first_rate = last_rate
-            if block.phase == FOLLOWS:
-                block.held = ground[2] - last_rate
-            if ends:
-                end_phase(block, ground[2] - last_rate)
-                first_rate = math.nan
-            tau = end if h >= end - tau else tau + h
+            if taken > 0:
+                j += taken
+                tau = piece.finish if j == count else piece.begin + j * whole
+                continue
+        h = min(max(longest, SHORTEST_STEP), end - tau)
+        h_taken, first_rate = take_step(law, block, piece, rises, now, tau, h, first_rate, history)
+        tau = end if h_taken >= end - tau else tau + h_taken
 
 
 # ------------------------------------------------------------------ pulses
@@ -606,7 +743,7 @@ def yield_governs(law: Law, block: np.record, low: float, high: float) -> bool:
     """Return whether Eq. 4 stays at or below Üy while Üg rises from low to high."""
     for j in range(POINTS_OF_RISE, -1, -1):
         ground = low + (high - low) * (j / POINTS_OF_RISE)
-        if ground - eq4_rate(law, block, ground, 0.0) > block.yield_acceleration:
+        if ground - eq4_rate_at_rest(law, block, ground) > block.yield_acceleration:
             return False
     return True
 
@@ -643,7 +780,7 @@ def set_friction_of_pulse(
     block.mode = eq.STICK_SLIP
     if peak > interface.limiting_acceleration:
         block.mode = eq.CONTINUOUS
-        block.held = peak - eq4_rate(law, block, peak, 0.0)  # for Eq. 12 after it
+        block.held = peak - eq4_rate_at_rest(law, block, peak)  # for Eq. 12 after it
         block.stick_slip_pulses -= 1.0
         block.continuous_pulses += 1.0
     elif block.rise == MONOTONE and yield_governs(law, block, block.yield_acceleration, peak):
@@ -669,7 +806,7 @@ def begin_pulse(
     if block.velocity > 0.0:
         block.validity |= flags.NOT_RECOUPLED
         begin_stick_slip(law, block, rises, ground, time, growth)
-    elif not rises and eq4_rate(law, block, ground, 0.0) > 0.0:  # Üg has jumped here, and falls
+    elif not rises and eq4_rate_at_rest(law, block, ground) > 0.0:  # Üg has jumped here, and falls
         begin_stick_slip(law, block, rises, ground, time, growth)
 
 
@@ -680,7 +817,7 @@ def enter_rise_or_fall(law: Law, block: np.record, piece: Piece, rises: bool) ->
         block.phase = HELD
     elif rises and block.phase == HELD:
         ground = block.amplitude * piece.first
-        eq4 = ground - eq4_rate(law, block, ground, block.velocity)
+        eq4 = eq4_of(law, block, ground)
         if block.rise == LITERAL or eq4 > block.held:
             block.held = eq4
             block.phase = FOLLOWS
@@ -695,7 +832,7 @@ def walk(
     wave: Wave,
     cycle: int,
     offset: float,
-    workspace: np.ndarray,
+    steps: Steps,
     history: History,
 ) -> None:
     """Go through the pieces of a cycle of the wave, whose times are `offset` later."""
@@ -724,20 +861,13 @@ def walk(
         now = offset + piece.start - piece.begin
         tau = piece.begin
         for until in (min(reaches, piece.finish), piece.finish):
-            moves = True
-            if block.phase == STUCK:
-                limit = block.yield_acceleration
-                if piece.top < 0.0:
-                    limit = block.upslope_yield_acceleration
-                moves = block.amplitude * abs(piece.top) > limit
-                moves = moves and (block.rise == NEWMARK or (rises and block.in_pulse == 1))
-                if moves and abs(piece.last) > abs(piece.first):
-                    tau = max(tau, place_of(block, piece, limit))
-            if block.validity & NO_VALUE == 0 and moves and tau < until:
+            waits = block.phase == STUCK and block.rise != NEWMARK and block.in_pulse == 0
+            if tau < until and not waits and block.validity & NO_VALUE == 0:
                 if block.phase == ATTENUATES:
                     attenuate(block, now + tau, until - tau, history)
                 else:
-                    step_along(law, block, piece, rises, now, tau, until, workspace, history)
+                    points = steps.wave[steps.first[p] : steps.first[p + 1]]
+                    step_along(law, block, piece, rises, now, tau, until, points, history)
             if until == reaches and not block.in_pulse:
                 if is_record:
                     set_friction_of_pulse(law, block, cell, options, peak)
@@ -824,7 +954,7 @@ def walk_all(
     cell: np.record,
     options: Options,
     wave: Wave,
-    workspace: np.ndarray,
+    steps: Steps,
     history: History,
 ) -> None:
     """Go through all cycles; those that gain what the last one did are not walked again."""
@@ -852,7 +982,7 @@ def walk_all(
             block.largest_displacement = displacement
             block.smallest_displacement = displacement
             offset = 2.0 * math.pi * (n - c)
-            walk(law, block, cell, options, wave, c, offset, workspace, history)
+            walk(law, block, cell, options, wave, c, offset, steps, history)
             walked = Cycle(
                 wave.shape[c],
                 phase,
@@ -898,7 +1028,7 @@ def solve_cell(
     cell: np.record,
     options: Options,
     wave: Wave,
-    workspace: np.ndarray,
+    steps: Steps,
     history: History,
 ) -> Motion:
     """Step a cell through the shaking and on to rest."""
@@ -928,7 +1058,7 @@ def solve_cell(
     if block.validity & NO_VALUE == 0 and block.amplitude * wave.highest > block.yield_acceleration:
         if not is_record and yield_governs_wave(law, block, wave):
             block.validity = flags.without_estimates(block.validity | flags.YIELD_GOVERNS)
-        walk_all(law, block, cell, options, wave, workspace, history)
+        walk_all(law, block, cell, options, wave, steps, history)
         end = wave.pieces[wave.pieces.shape[0] - 1].end
         run_out(block, end + 2.0 * math.pi * max(wave.repeats - 1, 0), history)
     sample_rest(block, math.inf, history)
@@ -953,14 +1083,35 @@ def solve_cells(
     options: Options,
     wave: Wave,
     blocks: np.ndarray,
-    workspace: np.ndarray,
+    steps: Steps,
     history: History,
     results: np.ndarray,
 ) -> None:
     """Step the cells of a tile with a friction law, as `solve_steps` does with that of the paper."""
     for j in range(cells.size):
-        motion = solve_cell(law, blocks[0], cells[j], options, wave, workspace, history)
+        motion = solve_cell(law, blocks[0], cells[j], options, wave, steps, history)
         flags.store(motion, j, results)
+
+
+def steps_of(wave: Wave, rule: int, steps: int, steps_on_piece: int) -> Steps:
+    """Return the base's motion at the points of all steps: so many in 2π, or on a piece."""
+    pieces = wave.pieces
+    length = pieces["finish"] - pieces["begin"]
+    each = 2 if rule == SIMPSON else 1
+    count = np.full(length.size, steps_on_piece)
+    if steps_on_piece == 0:
+        count = np.maximum(np.ceil(length / (2.0 * math.pi) * steps - 1e-9), 1).astype(np.int64)
+    sizes = each * count + 1
+    first = np.concatenate([[0], np.cumsum(sizes)])
+    # from the anchor of the piece, so that two that mirror each other have the same values
+    number = np.arange(first[-1]) - np.repeat(first[:-1], sizes)
+    number -= np.repeat(np.where(pieces["begin"] == 0.0, 0, sizes - 1), sizes)
+    tau = number * np.repeat(length / (each * count), sizes)
+    total = np.zeros(tau.size)
+    for coefficient in pieces["coefficients"].T[::-1]:
+        total = (total + np.repeat(coefficient, sizes)) * tau
+    top = np.repeat(pieces["top"], sizes)
+    return Steps(np.copysign(top + total, top), first)
 
 
 def blocks_of(rule: int, steps: int, steps_on_piece: int) -> np.ndarray:
@@ -989,14 +1140,14 @@ def solve_steps(
     options: Options,
     wave: Wave,
     blocks: np.ndarray,
-    workspace: np.ndarray,
+    steps: Steps,
     history: History,
     results: np.ndarray,
 ) -> None:
     """Step the cells of a tile with the friction law of the paper.
 
-    `cells` are of dtype `STEP_CELL`; `blocks`, (1,), says how they are stepped, `workspace` has room
-    for Üg on a piece; `results` is (fields of `Motion`, cells).
+    `cells` are of dtype `STEP_CELL`; `blocks`, (1,), says how they are stepped; `results` is (fields
+    of `Motion`, cells).
     """
     law = Law(exponential_friction, False)
-    solve_cells(law, cells, options, wave, blocks, workspace, history, results)
+    solve_cells(law, cells, options, wave, blocks, steps, history, results)
