@@ -19,7 +19,7 @@ from slipsweep.errors import InputError, RunError
 from slipsweep.model.parameters import check_numbers, number_text, shown
 from slipsweep.model.units import conversion
 from slipsweep.model.variables import HAZARD_RESULTS
-from slipsweep.motion.formats import read_columns, read_lines
+from slipsweep.motion.lines import read_columns, read_lines
 from slipsweep.studies.sampling import Floats, Thresholds
 from slipsweep.studies.suite_statistics import (
     THRESHOLDS,
