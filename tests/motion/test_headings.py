@@ -82,6 +82,13 @@ def test_units_as_headings_spell_them(tmp_path: Path, heading: str, unit: str) -
             read_record(path, units="g" if unit != "g" else "gal", interval=step)
 
 
+def test_headings_of_old_files_are_read(tmp_path: Path) -> None:
+    """m/s² is no UTF-8 there."""
+    path = written(tmp_path, "acceleration (m/s²)")[0]
+    path.write_bytes(path.read_text(encoding="utf-8").encode("latin-1"))
+    assert read_record(path).attrs["record_units"] == "m/s2"
+
+
 @pytest.mark.parametrize(
     "heading",
     [
@@ -110,6 +117,8 @@ def test_what_is_said_beside_an_acceleration_does_no_harm(tmp_path: Path, headin
         ("n.1000hyfh.BGZ.--.acc.V2c", "", "BGZ"),
         ("motion_z.csv", "", "Z"),
         ("a.VERT.txt", "", "VERT"),
+        ("station_hnz.txt", "", "HNZ"),
+        ("station_U-D.txt", "", "UD"),
         ("a.AT2", "UP", "UP"),
         ("a.AT2", "Vertical", "VERTICAL"),
         ("a.NS", "U-D", "UD"),

@@ -342,6 +342,9 @@ def test_a_trace_of_obspy() -> None:
     ):
         Record.from_obspy(trace(masked), "m/s2")
     assert Record.from_obspy(trace(masked), "m/s2", gaps="linear").times.size == 1000
+    vertical = trace(SHAKING)
+    vertical.id = "XX.ABC..HNZ"
+    assert Record.from_obspy(vertical, "m/s2").attrs["record_caution"] == "vertical component (HNZ)"
     for none, message in (
         (trace(np.arange(5)), "whole numbers, counts of a digitizer"),
         ([1.0], "must be a Trace of"),
@@ -409,6 +412,11 @@ def test_cosmos_with_several_channels(tmp_path: Path) -> None:
         ("      10 acceleration", "      11 acceleration", "10 values, where 11 are announced"),
         ("-100.00001", "-100.0x001", "must be numbers, 10 columns each"),
         ("End-of-data", "end of file", "no line End-of-data"),
+        (
+            "       1       1       4     120",
+            "       3       1       4     120",
+            "is COSMOS V3 (response spectra), which is not read",
+        ),
         ("     5.000000     0.050000", "     5.000000     0.500000", "real 63 says 0.5 s"),
         ("     0.005000     0.050000", "     0.005000     0.200000", "real 35 says 0.2 s"),
         ("     5.000000     0.050000", "    50.000000     0.050000", "every 0.05 s are 0.5 s"),

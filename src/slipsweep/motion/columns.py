@@ -8,7 +8,7 @@ import numpy as np
 
 from slipsweep.errors import InputError
 from slipsweep.model.parameters import shown
-from slipsweep.motion.headings import is_sentence, unit_said
+from slipsweep.motion.headings import is_sentence, is_unit, unit_said
 from slipsweep.motion.intensity import Floats
 from slipsweep.motion.lines import NUMBER, Samples, even_times
 from slipsweep.motion.reading import Reading
@@ -17,15 +17,18 @@ from slipsweep.motion.reading import Reading
 _STEP = r"(\d*[.,]?\d+(?:[eE][-+]?\d+)?)"
 _INTERVAL = (
     r"(?i)\b(?:dt|delta[ _-]?t|(?:sampling[ _-]?|time[ _-]?)?interval|time[ _-]?step"
-    rf"|sampling[ _-]?period)\b[^=:\n\d]*[=:]\s*{_STEP}"
+    rf"|sampling[ _-]?period|intervalo de muestreo)\b[^=:\n\d]*[=:]\s*{_STEP}"
 )
-_RATE = rf"(?i)\bsampl\w*[ _-]?(?:rate|freq\w*)\b[^=:\n\d]*[=:]?\s*{_STEP}"
+_RATE = (
+    r"(?i)\b(?:sampl\w*[ _-]?(?:rate|freq\w*)|(?:vel\w*|frec\w*)\.? de muestreo)\b"
+    rf"[^=:\n\d]*[=:]?\s*{_STEP}"
+)
 
 #: Names of a first column: times, and what else increases from line to line.
 _TIME = r"(?:t|time|zeit|tiempo|temps|tempo|zaman)\b"
 _NO_TIME = r"(?:period\w*|freq\w*|f|n|no|nr|num\w*|sample\w*|index|point\w*|step|count|i)\b"
 
-_MILLISECONDS = r"[(\[]\s*(ms|msecs?|milliseconds?|min|minutes?)\b"
+_NO_SECONDS = r"(ms|msecs?|milliseconds?|min|minutes?)\b"
 
 #: Shares of the differences of a column of times that are positive at least, and negative at most:
 #: places may be damaged.
@@ -164,8 +167,9 @@ def _with_times(text: _Text, reading: Reading) -> Samples:
             f"interval = {reading.interval:g}: the first column is that of times; "
             "leave interval out"
         )
-    if unit := re.search(
-        rf"(?i)(?:\b{_TIME}\s*{_MILLISECONDS})", f"{text.names[0]}\n{text.header}"
+    if unit := (
+        re.search(rf"(?i)(?<![a-z]){_NO_SECONDS}", text.names[0])
+        or re.search(rf"(?i)\b{_TIME}\s*[(\[]\s*{_NO_SECONDS}", text.header)
     ):
         raise InputError(f"time in {unit[1]}: must be in s")
     several = text.width > 2
@@ -213,7 +217,11 @@ def _without_names(header: str, width: int) -> tuple[str, list[str]]:
             while len(names) > width and not names[-1]:
                 names.pop()
             if len(names) == width and all(names):
-                return "\n".join((*lines[:at], *lines[at + 1 :])), names
+                above, upper = "\n".join(lines[:at]), [""] * width
+                if width > 1 and all(map(is_unit, names)):  # the names are above their units
+                    above, upper = _without_names(above, width)
+                names = [" ".join(filter(None, both)) for both in zip(upper, names, strict=True)]
+                return "\n".join((above, *lines[at + 1 :])), names
         if width == 1:
             break
     return header, [""] * width

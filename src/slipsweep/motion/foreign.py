@@ -27,7 +27,7 @@ _BINARY: tuple[tuple[bytes, str, str], ...] = (
     (rb"%PDF", "a PDF", _CONVERT),
     (rb"\xff\xfe|\xfe\xff", "text in UTF-16", "save it in UTF-8"),
     (
-        rb"[0-9 ]{6}[DRQM][ \x00](?s:.{0,100})\x00|\d{6}[VAST][ *]\d{3}|MS\x03",
+        rb"[0-9 ]{6}[DRQM][ \x00](?s:.{0,100})\x00|\d{6}(?:[DRQM] |[VAST][ *]\d{3})|MS\x03",
         "a miniSEED file",
         _OBSPY,
     ),
@@ -47,7 +47,7 @@ _TEXTS: tuple[tuple[str, str, str], ...] = (
     (r"TIMESERIES .*\b(?:SLIST|TSPAIR)", "an SLIST or TSPAIR file", _OBSPY),
     (r"(?:BEGIN GSE2|WID[12] )", "a GSE file", _OBSPY),
     (
-        r"\s*\d\s+(?:(?:UN)?CORRECTED ACCELEROGRAM|VELOCITY|DISPLACEMENT|.*SPECTR).*\n\s*\*",
+        r"\s*\d\s+(?:(?:UN)?CORRECTED ACCELEROGRAM|(?:VELOCITY|DISPLACEMENT|.*SPECTR).*\n\s*\*)",
         "an SMC file of USGS",
         _CONVERT,
     ),

@@ -25,7 +25,7 @@ from slipsweep.motion.lines import (
 )
 from slipsweep.motion.reading import UNITS, Reading
 
-_ASA_HEAD = "ARCHIVO ESTANDAR DE ACELERACION"
+_ASA_HEAD = r"ARCHIVO EST[AÁ]NDAR DE ACELERACI[OÓ]N|^INTERVALO DE MUESTREO,? C1"
 
 
 def read_samples(path: Path, lines: list[str], reading: Reading) -> tuple[str, Samples, str]:
@@ -72,7 +72,7 @@ def _format_of(lines: list[str]) -> str:
     first = lines[0] if lines else ""
     if re.search(_COSMOS_HEAD, first, re.IGNORECASE):
         return "cosmos"
-    if any(_ASA_HEAD in line.upper() for line in lines[:20]):
+    if any(re.search(_ASA_HEAD, line, re.IGNORECASE) for line in lines[:100]):
         return "asa"
     if any("NPTS" in line.upper() for line in lines[:6]):
         return "at2"
@@ -151,20 +151,20 @@ def _asa(lines: list[str], reading: Reading) -> Samples:
     Archivo Estándar de Aceleración 2.0: a header of names and values, those of each channel between
     slashes, then the channels side by side in columns of a Fortran format, which may touch.
     """
-    rules = [at for at, line in enumerate(lines) if line.startswith("---------+")]
-    if len(rules) < 2:
-        raise InputError("no two lines of ---------+ before its data: cut off, or damaged")
-    header = "\n".join(lines[: rules[0]])
-    names = _asa_field(header, "ORIENTACION", r"\S.*")
+    at = _asa_data(lines)
+    header = "\n".join(lines[:at])
+    intervals = _asa_field(header, "INTERVALO DE MUESTREO", NUMBER)
+    if not intervals:
+        raise InputError(
+            "no INTERVALO DE MUESTREO in its header, or none that can be read: damaged"
+        )
+    names = _asa_field(header, "ORIENTACION", r"\S.*") or [""] * len(intervals)
+    if len(intervals) not in (1, len(names)):
+        raise InputError(
+            f"INTERVALO DE MUESTREO: {len(intervals)} values, where ORIENTACION has {len(names)}"
+        )
     channel = chosen_channel(reading.channel, names)
-
-    def own(name: str) -> float:
-        values = _asa_field(header, name, NUMBER)
-        if len(values) != len(names):
-            raise InputError(f"{name}: {len(values)} values: must be one for each of {names}")
-        return float(values[channel])
-
-    interval = own("INTERVALO DE MUESTREO")
+    interval = float(intervals[min(channel, len(intervals) - 1)])
     width = re.search(r"(?im)^FORMATO DATOS[^:\n]*:.*?[FEG](\d+)", header)
     column = f".{{1,{width[1]}}}" if width else r"\S+"
 
@@ -175,27 +175,36 @@ def _asa(lines: list[str], reading: Reading) -> Samples:
             raise ValueError
         return words
 
-    at = rules[1] + 1
     rows = ((number, line) for number, line in enumerate(lines[at:], at + 1) if line.strip())
     values = numbers_in(rows, cells, f"{len(names)} accelerations").reshape(-1, len(names))
     # one of the two is wrong in some files
-    if abs(own("DURACION DEL REGISTRO") - len(values) * interval) > 2.0 * interval:
-        check_count(values[:, channel], int(own("NUM. TOTAL DE MUESTRAS")))
+    durations = _asa_field(header, "DURACION DEL REGISTRO", NUMBER)
+    points = _asa_field(header, "NUM. TOTAL DE MUESTRAS", COUNT)
+    is_as_long = len(durations) > channel and (
+        abs(float(durations[channel]) - len(values) * interval) <= 2.0 * interval
+    )
+    if not is_as_long and len(points) > channel:
+        check_count(values[:, channel], int(points[channel]))
     times = even_times(len(values), interval)
     return Samples(times, values[:, channel], unit_said(header), names[channel])
 
 
+def _asa_data(lines: list[str]) -> int:
+    """Where the data begin: behind the second line of ---------+, or at the first line of numbers."""
+    rules = [at for at, line in enumerate(lines) if line.startswith("---------")]
+    if len(rules) > 1:
+        return rules[1] + 1
+    first = (at for at, line in enumerate(lines) if re.fullmatch(rf"\s*{NUMBER}(\s+\S+)*\s*", line))
+    return next(first, len(lines))
+
+
 def _asa_field(header: str, name: str, pattern: str) -> list[str]:
-    """A field of C1-C6, and of C7-C12 where there are so many (InputError: it is not there)."""
-    texts = re.findall(rf"(?im)^{re.escape(name)}[^:\n]*\bC\d[^:\n]*:(.*)$", header)
+    """The values of a field, one a channel: of C1-C6, and of C7-C12 where there are so many."""
+    texts = re.findall(rf"(?im)^{re.escape(name)}[^:\n]*:(.*)$", header)
     parts = [
         part.strip() for text in texts if text.strip() for part in text.strip(" \t/").split("/")
     ]
-    if not parts or not all(re.fullmatch(pattern, part) for part in parts):
-        raise InputError(
-            f"no {name} in its header, or none that can be read: another format, or damaged"
-        )
-    return parts
+    return parts if all(re.fullmatch(pattern, part) for part in parts) else []
 
 
 #: Codes of units that are accelerations (Table 2 of the format).
@@ -262,6 +271,8 @@ def _cosmos_channel(lines: list[str], at: int) -> Samples | None:
     # what a V2 file may have behind the acceleration is its velocity and displacement
     if not any(line.lstrip().lower().startswith("end-of-data") for line in lines[at:]):
         raise InputError("no line End-of-data after the values: cut off, or damaged")
+    if whole[0] == 3:
+        raise InputError("is COSMOS V3 (response spectra), which is not read: give V1 or V2")
     if whole[1] != 1:
         return None
     unit = _cosmos_unit(int(whole[2]), lines[data])

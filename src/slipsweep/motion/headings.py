@@ -84,13 +84,19 @@ def vertical_mark(component: str, path: Path | None = None) -> str | None:
     found = [one for one in words if one in _VERTICAL or re.fullmatch(_VERTICAL_CHANNEL, one)]
     if found or path is None:
         return found[0] if found else None
-    parts = [part for part in re.split(r"[._\-\s]+", path.name) if part]
-    ends = [part.upper() for part in (parts[-1], *parts[-2:-1])] if len(parts) > 1 else []
+    name = re.sub(r"\bU-D\b|(?<=_)U-D\b", "UD", path.name)
+    parts = [part for part in re.split(r"[._\-\s]+", name) if part]
+    ends = [part.upper() for part in (*parts[-1:], *parts[-2:-1])]
+    is_end = (end for end in ends if end in _VERTICAL - {"U"})
     joined = re.search(_BEHIND_A_DIGIT, path.stem, re.IGNORECASE)
-    channel = next((part for part in parts if re.fullmatch(_VERTICAL_CHANNEL, part)), None)
-    return next((end for end in ends if end in _VERTICAL - {"U"}), None) or (
-        joined[1] if joined else channel
-    )
+    is_channel = (part for part in (*ends, *parts) if re.fullmatch(_VERTICAL_CHANNEL, part))
+    return next(is_end, None) or (joined[1] if joined else next(is_channel, None))
+
+
+def is_unit(text: str) -> bool:
+    """Whether a cell of a heading is a unit and nothing else, of a time or of a motion."""
+    bare = text.strip("()[] ")
+    return _plain(bare) in ("s", "ms", "min") or _first(iter([(bare, True)])) is not None
 
 
 def _first(candidates: Iterator[tuple[str, bool]]) -> _Unit | None:

@@ -36,10 +36,11 @@ def read_lines(path: Path) -> tuple[str, list[str]]:
         ) from None
     if refusal := binary_refusal(content):
         raise InputError(f"{path}: {refusal}")
-    # some editors put a byte-order mark in front; headers of old files are in whatever alphabet
-    return hashlib.sha256(content).hexdigest(), content.decode(
-        "utf-8-sig", errors="replace"
-    ).splitlines()
+    try:
+        text = content.decode("utf-8-sig")  # some editors put a byte-order mark in front
+    except UnicodeDecodeError:
+        text = content.decode("latin-1")  # m/s² of old files; their names matter to nobody
+    return hashlib.sha256(content).hexdigest(), text.splitlines()
 
 
 def fields_in(header: str, patterns: Mapping[str, str], where: str = "its header") -> list[str]:

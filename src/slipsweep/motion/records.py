@@ -182,7 +182,10 @@ class Record:
         values = check_numbers("trace.data", np.ma.filled(data, np.nan))
         times = interval * np.arange(values.size, dtype=np.float64)
         reading = Reading(baseline=baseline, gaps=gaps, implausible=implausible)
-        return _inspected(own, times, values, units, reading, {"record_format": "obspy"})
+        attrs = {"record_format": "obspy"}
+        if vertical := vertical_mark(str(trace.id).rpartition(".")[2]):  # the channel's code
+            attrs["record_vertical"] = vertical
+        return _inspected(own, times, values, units, reading, attrs)
 
     def corrected(self, baseline: Baseline) -> "Record":
         """The record less a constant ("mean") or a straight line ("linear", least squares); "none" leaves it."""
