@@ -259,6 +259,21 @@ def test_a_sample_of_zero_in_a_negative_half_wave_does_not_end_continuous_slidin
     assert float(expected.permanent_displacement) == pytest.approx(0.2968, abs=5e-5)
 
 
+def test_the_largest_velocity_may_be_beyond_the_positive_peak_on_the_negative_side() -> None:
+    """D = 0 at Üg = −(g/λ) ln 1.5 = −6.98 m/s², where v turns; the positive peak is 6 m/s²."""
+    times = np.array([0.0, 0.05, 0.1, 1.1, 1.15])
+    record = Record(times, np.array([0.0, 6.0, 0.0, -10.0, 0.0]))
+    cell = {
+        "theta": 0.0,
+        "mu_s": 0.5,
+        "yield_acceleration": 0.1,
+        "decay_rate": 0.57,
+        "delta_mu": 0.25,
+    }
+    expected = assert_is_reference(record, cell)
+    assert float(expected.peak_relative_velocity) == pytest.approx(0.6694, abs=5e-5)
+
+
 def test_zero_over_an_interval_ends_continuous_sliding() -> None:
     """From there on Eq. 12 brakes the block, though the base's acceleration is negative again."""
     cell = {"theta": 2.0, "mu_s": 0.3, "yield_acceleration": 1.0}
