@@ -55,10 +55,10 @@ def test_runs_and_writes(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPa
         else:
             headings = [heading for heading, *_ in tables(kept)]
             assert headings[0] == tables(written)[0][0]
-            for heading, *rows in tables(written):
+            for heading, *cells in tables(written):
                 assert heading in headings
-                assert rows, f"{file}: {heading}"
-                assert all(len(row) == len(heading) for row in rows), f"{file}: {heading}"
+                assert cells, f"{file}: {heading}"
+                assert all(len(row) == len(heading) for row in cells), f"{file}: {heading}"
 
 
 def tables(path: Path) -> list[list[list[str]]]:

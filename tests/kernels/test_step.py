@@ -333,9 +333,8 @@ class Hyperbolic:
         def stop(t: float, y: Any) -> float:
             return float(y[0])
 
-        # type: ignore[attr-defined]
-        stop.terminal = True
-        stop.direction = -1.0
+        stop.terminal = True  # type: ignore[attr-defined]
+        stop.direction = -1.0  # type: ignore[attr-defined]
         solution = solve_ivp(
             lambda t, y: (rate(self.amplitude * sin(t)), y[0]),
             (start, end),

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 import slipsweep
 from slipsweep.charts import kinds
@@ -51,7 +50,7 @@ def inside(area: Any, cells: Any) -> Any:
     return path.contains_points(cells, radius=1e-9) | path.contains_points(cells, radius=-1e-9)
 
 
-def drawn_as(figure: Figure, text: str) -> list[Line2D]:
+def drawn_as(figure: Figure, text: str) -> list[Any]:
     """Lines of a chart's first axes that look as an entry of the legend: colour, dash and marker."""
     texts = [entry.get_text() for entry in figure.legends[0].get_texts()]
     entry = figure.legends[0].legend_handles[texts.index(text)]
@@ -59,4 +58,5 @@ def drawn_as(figure: Figure, text: str) -> list[Line2D]:
 
 
 def _look(line: Any) -> tuple[Any, ...]:
-    return to_hex(line.get_color()), line.get_linestyle(), line.get_marker(), line.get_linewidth()
+    marker = str(line.get_marker()).replace("None", "")  # both are no marker
+    return to_hex(line.get_color()), line.get_linestyle(), marker, line.get_linewidth()
