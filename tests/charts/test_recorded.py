@@ -181,7 +181,7 @@ def test_some_motions_of_a_suite(result: xr.Dataset, suite: slipsweep.Suite) -> 
     )
 
 
-def test_what_is_refused_of_recorded_motions(result: xr.Dataset) -> None:
+def test_charts_that_recorded_motions_do_not_have_are_refused(result: xr.Dataset) -> None:
     for arguments, message in (
         (
             ("contours",),
@@ -207,7 +207,7 @@ def test_what_is_refused_of_recorded_motions(result: xr.Dataset) -> None:
             result.slipsweep.chart(kind, **options)
 
 
-def test_a_single_record() -> None:
+def test_a_record_has_a_curve_for_each_friction_coefficient() -> None:
     record = slipsweep.read_record(SWEEPS / "data" / "synthetic.csv")
     result = slipsweep.sweep(
         5.0, [0.3, 0.4], excitation=record, scale=[1.0, 1.5, 2.0], polarity="both"
@@ -320,7 +320,7 @@ def test_the_command_line_draws_what_the_accessor_draws(
     assert not Path("d.png").exists()
 
 
-def test_annual_rates(result: xr.Dataset) -> None:
+def test_annual_rates_of_a_suite_and_the_end_of_the_hazard_curve(result: xr.Dataset) -> None:
     curve = slipsweep.HazardCurve(np.array([0.5, 10.0]), np.array([1e-2, 1e-5]))
     rates = slipsweep.displacement_hazard(result.sel(theta=5.0), curve, [0.001, 0.01, 0.1])
     axes = Figure().subplots()

@@ -106,7 +106,7 @@ def test_constant_friction_is_the_first_line(capsys: pytest.CaptureFixture[str])
     assert 'friction = "newmark"' in Path("model.toml").read_text()
 
 
-def test_several_tests(capsys: pytest.CaptureFixture[str]) -> None:
+def test_two_tests_are_calibrated_together(capsys: pytest.CaptureFixture[str]) -> None:
     Path("short.csv").write_text("".join(Path(TEST).read_text().splitlines(keepends=True)[2::4]))
     assert cli.main(["calibrate", "short.csv", "short.csv", *BLOCK, "-o", "both.nc"]) == 0
     assert capsys.readouterr().out.count("cycle  starts, s") == 2
@@ -139,7 +139,7 @@ def test_several_tests(capsys: pytest.CaptureFixture[str]) -> None:
         (("calibrate", TEST, "--theta", "95", "--mu-s", "0.38"), "theta = 95"),
     ],
 )
-def test_what_cannot_be(
+def test_commands_on_tests_that_are_refused(
     arguments: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert cli.main(list(arguments)) == 2

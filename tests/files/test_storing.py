@@ -17,6 +17,7 @@ from slipsweep.files import running, spec, storing
 from slipsweep.files.jobs import Job, limit_job, sweep_job
 from slipsweep.files.opening import read_result
 from slipsweep.grid.tally import tally_of
+from tests.support.made_up_records import write_motion
 
 GRID = """
 [axes]
@@ -47,12 +48,6 @@ axes.frequency.values = [1, 2]
     "samples": WAVE
     + "[uncertainty]\nsamples = 16\ndecay_rate = {distribution = 'lognorm', s = 0.3, scale = 2.0}\n",
 }
-
-
-def write_motion(path: Path, seed: int, count: int, interval: float) -> None:
-    values = 0.3 * np.random.default_rng(seed).normal(size=count) * np.hanning(count)
-    rows = (f"{at * interval:.6g},{value:.6g}\n" for at, value in enumerate(values))
-    path.write_text("time,acceleration\n" + "".join(rows))
 
 
 @pytest.fixture

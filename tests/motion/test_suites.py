@@ -126,7 +126,9 @@ def test_measures_along_the_motions(folder: Path) -> None:
         ((noise(1), noise(2)), ("a", 2), "^labels = .* 2 different texts"),
     ],
 )
-def test_what_is_no_suite(motions: Any, labels: Any, words: str) -> None:
+def test_suites_without_motions_or_with_wrong_labels_are_refused(
+    motions: Any, labels: Any, words: str
+) -> None:
     with pytest.raises(InputError, match=words):
         Suite(motions, labels)
     with pytest.raises(

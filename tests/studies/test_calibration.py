@@ -86,7 +86,7 @@ def test_noise_digitisation_and_cycles(clean: dict[str, xr.Dataset], mode: str) 
 
 
 @pytest.mark.parametrize("kind", ["eq4", "yield", "continuous"])
-def test_coverage(kind: str) -> None:
+def test_intervals_hold_the_true_parameters(kind: str) -> None:
     """Of 3 x 4 intervals at 95 % three or more miss in 2 % of all such draws; these seeds are fixed."""
     missed = 0
     for seed in range(4):
@@ -274,7 +274,7 @@ def test_the_tables_to_paste_run(clean: dict[str, xr.Dataset], tmp_path: Path) -
         ({"ground_acceleration": 1000.0}, {}, "the block would lift off"),
     ],
 )
-def test_what_cannot_be(
+def test_tests_that_tell_nothing_are_refused(
     clean: dict[str, xr.Dataset], change: dict[str, float], options: dict[str, Any], message: str
 ) -> None:
     test = clean["stick_slip"].copy(deep=True)

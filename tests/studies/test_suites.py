@@ -202,7 +202,7 @@ def test_samples_are_those_of_each_motion(strength: str, time_scale: Any) -> Non
         ({"variables": ["sliding_mode"]}, "variables = 'sliding_mode'"),
     ],
 )
-def test_what_suites_refuse(given: dict[str, Any], words: str) -> None:
+def test_inputs_that_a_suite_lacks_are_named(given: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         sweep(5, 0.3, **{"excitation": SUITE, **given})
 

@@ -261,7 +261,8 @@ def test_factor_on_an_estimate(name: str) -> None:
 @pytest.mark.parametrize("name", ["decay_rate", "delta_mu", "minimum_friction"])
 def test_a_factor_on_an_estimate_that_fails_has_no_value(name: str) -> None:
     """λ by Eq. 6 is negative: the block has a flag and no displacement, not 0, whatever is drawn about it."""
-    block = {"theta": 0.0, "mu_s": 1.5, "amplitude": 14.0, "yield_acceleration": 1.0}
+    block: dict[str, Any] = {"theta": 0.0, "mu_s": 1.5, "amplitude": 14.0}
+    block["yield_acceleration"] = 1.0
     estimate = slipsweep.friction_parameters(**block)
     assert estimate.decay_rate < 0.0
     about = {"distribution": "uniform", "loc": 0.9, "scale": 0.2, "kind": "factor"}
