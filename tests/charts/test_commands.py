@@ -43,7 +43,9 @@ def test_default_set_of_charts(grid_file: Path, here: Path) -> None:
 
 
 @pytest.mark.usefixtures("without_layout")
-def test_formats(grid_file: Path, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_chart_is_written_in_the_format_of_its_name(
+    grid_file: Path, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     outputs = [f"-oa.{suffix}" for suffix in ("png", "svg", "pdf")]
     assert (
         main(

@@ -273,7 +273,7 @@ def test_control_sequences_of_a_file_do_not_reach_the_terminal(small: Path) -> N
 # ---------------------------------------------------------------------------- info, simulate
 
 
-def test_info(small: Path) -> None:
+def test_info_prints_axes_variables_and_shares(small: Path) -> None:
     command(small, "run", "small.toml")
     done = command(small, "info", "small.nc")
     assert done.returncode == 0

@@ -93,7 +93,9 @@ def test_simulate_without_a_value_says_why_and_fails(
     assert not (tmp_path / "a.csv").exists()
 
 
-def test_reasons_and_remedies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_messages_give_reasons_and_remedies(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """An angle taken for a coefficient, values that a record lacks, an axis that is not there, and unsound places."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a.toml").write_text(SWEEP.replace("0.4", "22"))

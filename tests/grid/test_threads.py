@@ -177,7 +177,7 @@ def test_dasks_threads(expected: np.ndarray) -> None:
     "method", [m for m in ("fork", "spawn") if m in multiprocessing.get_all_start_methods()]
 )
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
-def test_processes(method: str, expected: np.ndarray) -> None:
+def test_processes_forked_or_not_give_the_same_bits(method: str, expected: np.ndarray) -> None:
     """Forked after a sweep, too: no thread is left that a child could miss; and kernels that are loaded give the bits
     of those that were compiled here."""
     # a process that is not forked takes two seconds to start

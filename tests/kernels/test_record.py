@@ -18,7 +18,7 @@ from slipsweep.motion.cutting import wave_of_record
 from tests.support.block import Interface
 from tests.support.cases import choices
 from tests.support.digits import workdps
-from tests.support.made_up_records import SEEN, difference, made
+from tests.support.made_up_records import SEEN, band_noise, difference, made
 from tests.support.reference import RecordSolution, solve_record
 from tests.support.sections import sections_of_record
 
@@ -39,13 +39,7 @@ def displacement(record: Record, **given: Any) -> float:
 
 @pytest.fixture(scope="module")
 def shaking() -> Record:
-    """Noise with a band and an envelope of earthquakes: pulses of all sizes, several maxima each."""
-    rng = np.random.default_rng(7)
-    times = np.arange(0.0, 20.0, 0.01)
-    phases = rng.uniform(0, 2 * pi, 60)
-    bands = np.sin(2 * pi * np.linspace(0.3, 9.0, 60)[:, None] * times + phases[:, None]).sum(0)
-    wave = bands * (times / 4) ** 2 * np.exp(-times / 2.5)
-    return Record(times, 6.0 * wave / np.abs(wave).max())
+    return band_noise()
 
 
 # ------------------------------------------------------------------------- a linear piece

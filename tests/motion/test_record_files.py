@@ -58,7 +58,9 @@ def write(folder: Path, name: str, text: str) -> Path:
         ("NPTS= 2, DT= .0100 SEC\n .1 .2\n", None, 9.80665),
     ],
 )
-def test_formats(tmp_path: Path, text: str, units: Any, factor: float) -> None:
+def test_columns_of_times_and_accelerations_in_each_unit(
+    tmp_path: Path, text: str, units: Any, factor: float
+) -> None:
     record = read_record(write(tmp_path, "a", text), units=units)
     np.testing.assert_allclose(record.times, [0.0, 0.01], rtol=1e-15)
     np.testing.assert_allclose(record.acceleration, [0.1 * factor, 0.2 * factor], rtol=1e-15)

@@ -69,7 +69,7 @@ def test_pieces_are_the_wave(name: str) -> None:
 
 
 @each
-def test_pieces_join(name: str) -> None:
+def test_no_phase_of_a_wave_is_left_out_of_its_pieces(name: str) -> None:
     """No phase is left out, and w jumps only where it is said to, upwards, or down."""
     wave = wave_of(EVERY[name])
     assert wave.pieces[0].start == 0.0

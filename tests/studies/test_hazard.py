@@ -98,7 +98,7 @@ def test_what_lies_outside_is_told() -> None:
         exceedance_rates(curve, [20.0, 30.0], [0.1, 0.2])
 
 
-def test_against_quadrature() -> None:
+def test_rates_are_the_integral_over_straight_lines() -> None:
     """Straight lines of the fragility over a curve with a kink between, by a fine sum."""
     curve = curve_of([0.5, 3.0, 12.0], [0.02, 0.003, 0.00005])
     amplitude = np.array([1.0, 2.0, 6.0, 9.0])
@@ -386,7 +386,7 @@ def test_curves_that_are_refused(tmp_path: Path, text: str, message: str) -> Non
     assert str(path) in str(refused.value)
 
 
-def test_the_command(tmp_path: Path) -> None:
+def test_hazard_prints_rates_and_what_is_not_known_of_them(tmp_path: Path) -> None:
     """It prints the rates that the function gives, draws them, and says what to do about what is not known."""
     rng = np.random.default_rng(3)
     amplitude = np.geomspace(0.5, 10.0, 6)

@@ -137,8 +137,9 @@ def unsound(
 ) -> tuple[xr.DataArray, str]:
     """Where the displacements `drawn` of a slice have a trend that no block has, and the trends and shares in words.
 
-    One is smaller than at an amplitude that is 1 % smaller, of recorded motions than at the next
-    smaller amplitude of the slice; or it is less than half of that of Newmark's block, `theirs`.
+    One is smaller than at an amplitude that is 1 % smaller, which is solved for each cell, of
+    recorded motions than at the next smaller amplitude of the slice; or it is less than half of
+    that of Newmark's block, `theirs`.
     """
     ours = data[DISPLACEMENT]
     drive = next(

@@ -99,8 +99,10 @@ def intensity(result: Result, options: Options) -> Figure:
                 own: Look = {"gid": name, "linestyle": "", **look}
                 (sheet.legend[name],) = panel.axes.plot(xs[which], heights[which], **own)
         _draw_regression(sheet, panel, xs, ys)
+    left_out = _sliding_left_out(sheet)
+    but = f", but for {left_out} left out" if left_out else ""
     sheet.notes.append(
-        "Regression of ln u on the logarithm of the abscissa, of all motions that slide; "
+        f"Regression of ln u on the logarithm of the abscissa, of all motions that slide{but}; "
         "σ: standard deviation of ln u about it."
     )
     sheet.notes.append(
@@ -231,6 +233,13 @@ def _scattered(panel: Panel, measure: str) -> Floats:
     ys = solved.reliable(data, solved.DISPLACEMENT, panel.options.show_cautions) * 1000.0
     every = np.array([one.values.ravel() for one in xr.broadcast(xs, ys, data["polarity"])])
     return every[:, np.isfinite(every[1])]
+
+
+def _sliding_left_out(sheet: Sheet) -> int:
+    """Number of motions of all panels that slide and are not drawn, as their displacements are unreliable."""
+    moved = sheet.data[solved.DISPLACEMENT]
+    drawn = solved.reliable(sheet.data, solved.DISPLACEMENT, sheet.options.show_cautions)
+    return int((moved.notnull() & (moved != 0.0) & drawn.isnull()).sum())
 
 
 def _draw_regression(sheet: Sheet, panel: Panel, xs: Floats, ys: Floats) -> None:
