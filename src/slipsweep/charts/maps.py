@@ -71,12 +71,12 @@ def contours(result: Result, options: Options) -> Figure:
     levels = levels or _levels(name, drawn.values)
     if not levels or not np.isfinite(drawn).any():
         why = "all values are about the same" if (drawn > 0).any() else "no values above zero"
-        sheet.notes.append(f"No contours: {why}.")
+        sheet.note(f"No contours: {why}.")
         return _finish(sheet, name)
     logs = xr.apply_ufunc(np.log10, drawn.clip(min=levels[0]))
     growth = [logs.diff(dim) for dim in (sheet.x, str(sheet.y))]
     if any((abs(one) > 1.0).sum() > _COARSE * (one != 0.0).sum() for one in growth):
-        sheet.notes.append(
+        sheet.note(
             "Coarse grid: values grow more than tenfold from cell to cell; read none between cells."
         )
     of_length = RESULTS[name].get("units") == "m"
@@ -105,7 +105,7 @@ def newmark(result: Result, options: Options) -> Figure:
     )
     there = sheet.data["drawn"].where(sheet.data["drawn"] > 0)
     if not there.count():
-        sheet.notes.append("No ratio: no displacement above zero.")
+        sheet.note("No ratio: no displacement above zero.")
         return _finish(sheet, DISPLACEMENT)
     farthest = np.abs(np.log10(there)).max()
     # the colour changes at these and at their inverses; the first is as good as one
@@ -280,7 +280,7 @@ def _finish(sheet: Sheet, name: str) -> Figure:
         if count
     ]
     if small:
-        sheet.notes.append(f"Also, in regions too small to hatch: {'; '.join(small)}.")
+        sheet.note(f"Also, in regions too small to hatch: {'; '.join(small)}.")
     if name != "sliding_mode":
         sheet.note_left_out(name)
     return sheet.done(beside=False)
