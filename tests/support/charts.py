@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.path import Path
 
 import slipsweep
 from slipsweep.charts import kinds
@@ -38,6 +39,14 @@ def caption(figure: Figure) -> str:
 
 
 def inside(area: Any, cells: Any) -> Any:
-    """Which points a filled area covers, those on its edge among them."""
+    """Which points a filled area covers, those on its edge among them, where it is not clipped."""
     (path,) = area.get_paths()
-    return path.contains_points(cells, radius=1e-9) | path.contains_points(cells, radius=-1e-9)
+    covered = _contains(path, cells)
+    if area.get_clip_path() is not None:
+        region = area.get_clip_path().get_fully_transformed_path()
+        covered &= _contains(region, area.axes.transData.transform(cells))
+    return covered
+
+
+def _contains(path: Path, points: Any) -> Any:
+    return path.contains_points(points, radius=1e-9) | path.contains_points(points, radius=-1e-9)
