@@ -57,7 +57,7 @@ class Drawing:
         self, options: Options, rows: int, columns: int, size: tuple[float, float], **shared: Any
     ) -> None:
         self.options = options
-        axes = options.ax
+        axes: object = options.ax
         if axes is None:
             factor = 1.0 if options.inches is None else options.inches / size[0]
             self.figure = Figure(figsize=(size[0] * factor, size[1] * factor), layout="constrained")
