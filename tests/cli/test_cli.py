@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from slipsweep import cli
+from slipsweep.cli.options import app
 from tests.support.commands import SLIPSWEEP, command, run_command, slipsweep
 
 SWEEPS = Path(__file__).parents[2] / "sweeps"
@@ -39,9 +39,7 @@ SIMULATE = (
 )
 
 #: All commands.
-NAMES = sorted(
-    one.callback.__name__ for one in cli.app.registered_commands if one.callback is not None
-)
+NAMES = sorted(one.callback.__name__ for one in app.registered_commands if one.callback is not None)
 
 
 def assert_fails(done: "subprocess.CompletedProcess[str]", status: int, *messages: str) -> None:

@@ -26,7 +26,8 @@ GRID: dict[str, Any] = {
 
 def displacement(waveform: str = "sine") -> np.ndarray:
     result = slipsweep.sweep(**GRID, excitation=waveform, variables=["permanent_displacement"])
-    return result.permanent_displacement.values
+    values: np.ndarray = result.permanent_displacement.values
+    return values
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,9 @@ import sys
 import time
 from pathlib import Path
 
+import numba
 import numpy as np
+import platformdirs
 import pytest
 
 import slipsweep
@@ -113,8 +115,8 @@ def test_without_a_folder_of_its_own_all_still_runs(tmp_path: Path, why: str) ->
 
 
 def test_old_versions_are_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compiling.numba.config, "CACHE_DIR", "")
-    monkeypatch.setattr(compiling.platformdirs, "user_cache_path", lambda name: tmp_path / name)
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+    monkeypatch.setattr(platformdirs, "user_cache_path", lambda name: tmp_path / name)
     compiling.cache_folder.cache_clear()
     for number in range(9):
         (tmp_path / "slipsweep" / f"{number:016x}").mkdir(parents=True)

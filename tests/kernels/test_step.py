@@ -321,7 +321,8 @@ class Hyperbolic:
         options = Options(
             MONOTONE, EQ12 if recoupling == "eq12" else INTEGRATE, cycles, wants_peak=True, g=G
         )
-        return solve_hyperbolic(cell, options, wave, steps)
+        motion: Motion = solve_hyperbolic(cell, options, wave, steps)
+        return motion
 
     def integrate(
         self, start: float, end: float, state: Any, rate: Any, stops: bool = False
@@ -331,9 +332,8 @@ class Hyperbolic:
         def stop(t: float, y: Any) -> float:
             return float(y[0])
 
-        # type: ignore[attr-defined]
-        stop.terminal = True
-        stop.direction = -1.0
+        stop.terminal = True  # type: ignore[attr-defined]
+        stop.direction = -1.0  # type: ignore[attr-defined]
         solution = solve_ivp(
             lambda t, y: (rate(self.amplitude * sin(t)), y[0]),
             (start, end),
