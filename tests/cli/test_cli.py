@@ -4,7 +4,6 @@ import contextlib
 import csv
 import os
 import re
-import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -185,6 +184,8 @@ def test_bad_commands_are_refused_by_typer(
 
 
 def limited() -> None:
+    import resource  # not on Windows
+
     resource.setrlimit(resource.RLIMIT_FSIZE, (2_000, 2_000))
 
 
