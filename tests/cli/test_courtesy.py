@@ -1,7 +1,9 @@
 """Units as people type them, names as commands can write them, and a reason where there is no number."""
 
+import importlib
 import math
 import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -196,3 +198,15 @@ def test_limit_says_what_it_took(tmp_path: Path) -> None:
 
 def test_version() -> None:
     assert told("--version") == f"slipsweep {__version__}\n"
+
+
+def test_versions_are_those_of_the_modules_that_are_loaded() -> None:
+    lines = told("--versions").splitlines()
+    assert lines[0] == f"slipsweep {__version__}"
+    for name in ("dask", "llvmlite", "matplotlib", "numba", "numpy", "pandas", "scipy", "xarray"):
+        assert f"{name} {importlib.import_module(name).__version__}" in lines
+
+
+def test_versions_name_what_cannot_be_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "netCDF4", None)
+    assert "netCDF library: import of netCDF4 halted" in told("--versions")

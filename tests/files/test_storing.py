@@ -3,6 +3,7 @@
 import math
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -324,7 +325,7 @@ def packed(table: xr.Dataset) -> xr.Dataset:
 
 
 #: What other programs do to a file, and leave its meaning.
-EDITS = {
+EDITS: dict[str, Callable[[xr.Dataset], xr.Dataset]] = {
     "packed": packed,
     "transposed": lambda table: table.transpose(*reversed(table.permanent_displacement.dims)),
     "codes as numbers": lambda table: table.assign(sliding_mode=table.sliding_mode.astype(float)),

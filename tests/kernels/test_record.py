@@ -60,7 +60,9 @@ def _follow(decay: float, x: float, change: float) -> tuple[float, float]:
     """Gains under Eq. 4 on a record of one piece, a second long."""
     pieces = wave_of_record(Record.sampled([x, x + change], 1.0), 1.0).pieces
     assert pieces.shape[0] == 1
-    return _followed((tan(radians(8.0)), 0.4, 1.0, 1.0, decay, 0.1, 0.1), pieces)
+    cell = (tan(radians(8.0)), 0.4, 1.0, 1.0, decay, 0.1, 0.1)
+    gains: tuple[float, float] = _followed(cell, pieces)
+    return gains
 
 
 def _exact(decay: float, x: float, change: float) -> tuple[mpfr, mpfr]:

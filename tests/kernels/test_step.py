@@ -324,7 +324,8 @@ class Hyperbolic:
         options = Options(
             MONOTONE, EQ12 if recoupling == "eq12" else INTEGRATE, cycles, wants_peak=True, g=G
         )
-        return solve_hyperbolic(cell, options, wave, steps)
+        motion: Motion = solve_hyperbolic(cell, options, wave, steps)
+        return motion
 
     def integrate(
         self, start: float, end: float, state: Any, rate: Any, stops: bool = False

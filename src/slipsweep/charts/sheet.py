@@ -73,7 +73,7 @@ class Drawing:
     ) -> None:
         self.options = options
         self.figure: Figure
-        axes = options.ax
+        axes: object = options.ax
         if axes is None:
             factor = 1.0 if options.inches is None else options.inches / size[0]
             self.figure = Chart(figsize=(size[0] * factor, size[1] * factor), layout="constrained")

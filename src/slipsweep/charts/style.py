@@ -209,7 +209,7 @@ def is_acceleration(name: str) -> bool:
 
 def unit(name: str) -> str:
     """The unit of a parameter, result or intensity measure as people write it; nothing for a pure number."""
-    units = _ABOUT[name].get("units", "1")
+    units: str = _ABOUT[name].get("units", "1")
     return _UNITS.get(units, units)
 
 

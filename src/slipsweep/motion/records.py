@@ -376,7 +376,8 @@ def _is_fill(values: Floats) -> NDArray[np.bool_]:
         and magnitude.max(initial=0.0) > 20.0 * rest > 0.0
         and values.size > _FEWEST
     )
-    return missing | (largest & is_alone)
+    fill: NDArray[np.bool_] = missing | (largest & is_alone)
+    return fill
 
 
 def _held(times: Floats, values: Floats) -> Iterator[str]:
