@@ -38,7 +38,8 @@ WAVES: dict[str, Waveform] = {
 
 def displacement(**options: Any) -> xr.DataArray:
     """`slipsweep.sweep` of nothing but the permanent displacement."""
-    return slipsweep.sweep(**options, variables=["permanent_displacement"]).permanent_displacement
+    result = slipsweep.sweep(**options, variables=["permanent_displacement"])
+    return result["permanent_displacement"]
 
 
 def size_of(grid: Mapping[str, Any]) -> int:

@@ -7,7 +7,14 @@ import pytest
 import xarray as xr
 
 import slipsweep
-from tests.support.charts import AMPLITUDES, FREQUENCIES, LINED_SINE, SINE
+from tests.support.charts import (
+    AMPLITUDES,
+    FREQUENCIES,
+    LINED_SINE,
+    SINE,
+    SUITE_AMPLITUDES,
+    SWEEPS,
+)
 
 
 @pytest.fixture(scope="session")
@@ -36,3 +43,22 @@ def grid_file(grid: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> Pat
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+@pytest.fixture(scope="session")
+def suite() -> slipsweep.Suite:
+    return slipsweep.read_suite(str(SWEEPS / "data" / "suite" / "*.AT2"))
+
+
+@pytest.fixture(scope="session")
+def result(suite: slipsweep.Suite) -> xr.Dataset:
+    """Newmark's block under a suite in both polarities."""
+    return slipsweep.sweep(
+        [5.0, 20.0],
+        [0.3, 0.4],
+        SUITE_AMPLITUDES,
+        excitation=suite,
+        polarity="both",
+        model="newmark",
+        variables=["permanent_displacement", "validity", "newmark_displacement", "motion_factor"],
+    )

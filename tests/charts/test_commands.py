@@ -43,7 +43,9 @@ def test_default_set_of_charts(grid_file: Path, here: Path) -> None:
 
 
 @pytest.mark.usefixtures("without_layout")
-def test_formats(grid_file: Path, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_chart_is_written_in_the_format_of_its_name(
+    grid_file: Path, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     outputs = [f"-oa.{suffix}" for suffix in ("png", "svg", "pdf")]
     assert (
         main(
@@ -127,7 +129,7 @@ def test_the_title_page_names_axes_and_flags(grid_file: Path) -> None:
         (lambda data: data.isel(theta=slice(0)), "holds no cells"),
         (
             lambda data: data.swap_dims(theta="case").isel(amplitude=0, frequency=0),
-            "needs an axis with two values",
+            "no axis has two values or more",
         ),
     ],
 )

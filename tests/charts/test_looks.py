@@ -112,7 +112,7 @@ def test_curves_and_modes_differ_without_colour(lined: xr.Dataset) -> None:
 
 
 @pytest.mark.parametrize("kind", [kind for kind in SWEEP_KINDS if kind != "curve"])
-def test_panels(lined: xr.Dataset, kind: str) -> None:
+def test_panels_share_their_scale(lined: xr.Dataset, kind: str) -> None:
     x = {"x": "theta"} if kind in ("contours", "modes", "newmark") else {}
     figure = lined.slipsweep.chart(kind, panels=["mu_s"], at={"mu_s": "0.25,0.4"}, **x)
     panels = [axes for axes in figure.axes if axes.get_title()]
@@ -153,7 +153,7 @@ def test_labels_of_panels_lie_apart(grid: xr.Dataset) -> None:
     assert all(left.x1 < right.x0 for left, right in itertools.pairwise(boxes))
 
 
-def test_little_to_draw(grid: xr.Dataset) -> None:
+def test_charts_of_zeros_of_nothing_and_of_one_value(grid: xr.Dataset) -> None:
     """All zero, all missing, one value: what can be drawn is, and the rest says why."""
     small = slipsweep.sweep([0.0, 5.0, 30.0], [0.3, 0.5], [1.0, 2.0, 4.0, 7.0], [1.0, 2.0, 4.0])
     for fill in (0.0, np.nan):

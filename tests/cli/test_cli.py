@@ -4,7 +4,6 @@ import contextlib
 import csv
 import os
 import re
-import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -14,7 +13,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from slipsweep import cli
+from slipsweep.cli.options import app
 from tests.support.commands import SLIPSWEEP, command, run_command, slipsweep
 
 SWEEPS = Path(__file__).parents[2] / "sweeps"
@@ -39,9 +38,7 @@ SIMULATE = (
 )
 
 #: All commands.
-NAMES = sorted(
-    one.callback.__name__ for one in cli.app.registered_commands if one.callback is not None
-)
+NAMES = sorted(one.callback.__name__ for one in app.registered_commands if one.callback is not None)
 
 
 def assert_fails(done: "subprocess.CompletedProcess[str]", status: int, *messages: str) -> None:
@@ -187,6 +184,8 @@ def test_bad_commands_are_refused_by_typer(
 
 
 def limited() -> None:
+    import resource  # not on Windows
+
     resource.setrlimit(resource.RLIMIT_FSIZE, (2_000, 2_000))
 
 
@@ -273,7 +272,7 @@ def test_control_sequences_of_a_file_do_not_reach_the_terminal(small: Path) -> N
 # ---------------------------------------------------------------------------- info, simulate
 
 
-def test_info(small: Path) -> None:
+def test_info_prints_axes_variables_and_shares(small: Path) -> None:
     command(small, "run", "small.toml")
     done = command(small, "info", "small.nc")
     assert done.returncode == 0

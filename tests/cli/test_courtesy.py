@@ -1,6 +1,9 @@
 """Units as people type them, names as commands can write them, and a reason where there is no number."""
 
+import importlib
 import math
+import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -92,7 +95,9 @@ def test_simulate_without_a_value_says_why_and_fails(
     assert not (tmp_path / "a.csv").exists()
 
 
-def test_reasons_and_remedies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_messages_give_reasons_and_remedies(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """An angle taken for a coefficient, values that a record lacks, an axis that is not there, and unsound places."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a.toml").write_text(SWEEP.replace("0.4", "22"))
@@ -114,6 +119,52 @@ def test_reasons_and_remedies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     told("chart", "b.nc", "-k", "curve", "--at", "mu_s=0.404", "-o", "a.png")
     message = told("chart", "b.nc", "--at", "frequncy=2", "-o", "b.png", status=2)
     assert 'frequncy = 2: no such axis; did you mean "frequency"?' in message
+
+
+def test_run_and_info_say_what_motions_lack(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Vertical components, clipping, zeros, large factors; also when the result is repeated."""
+    monkeypatch.chdir(tmp_path)
+    Path("m").mkdir()
+    shaking = [math.sin(0.3 * at + 0.2) for at in range(40)]
+    motions = {
+        "weak": [0.1 * value for value in shaking],
+        "clipped": [min(value, 0.7) for value in shaking],
+        "half": [*shaking[:20], *[0.0] * 20],
+        "a-UP": shaking,
+    }
+    for name, values in motions.items():
+        Path(f"m/{name}.txt").write_text("dt = 0.02, in m/s2\n" + "\n".join(map(str, values)))
+    sweep = (
+        'model.friction = "newmark"\nexcitation.records = "m"\naxes.theta.values = [5]\n'
+        "axes.mu_s.values = [0.2]\naxes.amplitude.values = [0.3, 2]\n"
+    )
+    Path("a.toml").write_text(sweep)
+    for out in (told("run", "a.toml"), told("run", "a.nc", "-o", "b.nc")):
+        assert re.search(r"clipped\.txt: .*; caution: flat at its largest value 0\.7 m/s2 \(", out)
+        assert "half.txt: " in out
+        assert "; caution: 50% of its samples are 0" in out
+        assert "left out, vertical components: a-UP.txt (UP); vertical = 'accept' takes them" in out
+        assert "\nscale factors above 4, up to 20: weak; such motions have the frequencies" in out
+    for file in ("a.nc", "b.nc"):
+        out = told("info", file)
+        assert re.search(r"^caution: .*half\.txt: 50% of its samples are 0$", out, re.MULTILINE)
+        assert "left_out_vertical: a-UP.txt (UP)" in out
+    Path("b.toml").write_text(sweep.replace("[0.3, 2]", "[0.3]"))
+    assert "scale factors" not in told("run", "b.toml", "-o", "low.nc")
+    one = sweep.replace('records = "m"', 'record = "m/weak.txt"')
+    Path("c.toml").write_text(one.replace("amplitude", "scale").replace("[0.3, 2]", "[1, 5]"))
+    assert "scale factors above 4, up to 5; such motions" in told("run", "c.toml")
+    Path("d.toml").write_text(f'{one}excitation.vertical = "accept"\n')
+    message = told("run", "d.toml", status=2)
+    assert "excitation.vertical: only beside excitation.records" in message
+    Path("e.toml").write_text(f'{sweep}excitation.vertical = "accept"\n')
+    assert "; caution: vertical component (UP)" in told("run", "e.toml")
+    assert (
+        "record                  m/half.txt: "
+        in (told("simulate", "--record", "m/half.txt", *BLOCK[1:5]).splitlines()[0])
+    )
 
 
 def test_hazard_of_samples_has_rows_for_each_frequency(tmp_path: Path) -> None:
@@ -147,3 +198,15 @@ def test_limit_says_what_it_took(tmp_path: Path) -> None:
 
 def test_version() -> None:
     assert told("--version") == f"slipsweep {__version__}\n"
+
+
+def test_versions_are_those_of_the_modules_that_are_loaded() -> None:
+    lines = told("--versions").splitlines()
+    assert lines[0] == f"slipsweep {__version__}"
+    for name in ("dask", "llvmlite", "matplotlib", "numba", "numpy", "pandas", "scipy", "xarray"):
+        assert f"{name} {importlib.import_module(name).__version__}" in lines
+
+
+def test_versions_name_what_cannot_be_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "netCDF4", None)
+    assert "netCDF library: import of netCDF4 halted" in told("--versions")

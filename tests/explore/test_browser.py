@@ -14,12 +14,20 @@ from slipsweep import (
     Sine,
     SlidingMode,
     Validity,
+    flags,
     read_suite,
     simulate,
     sweep,
 )
 from slipsweep.explore.page import write_page
-from slipsweep.model.variables import CAUTIONS, FLAG_KIND_TEXT, VALUELESS, FlagKind, flags_of
+from slipsweep.model.variables import (
+    CAUTIONS,
+    FLAG_KIND_TEXT,
+    RESULTS,
+    VALUELESS,
+    FlagKind,
+    flags_of,
+)
 from tests.support.browser import FOUND, chosen, move, point, show, text_of, wait_for
 from tests.support.pages import AXES, SUITE
 
@@ -148,7 +156,10 @@ def test_history_is_of_the_very_cell_that_is_named(opened: Any) -> None:
     ):
         assert float(exact.max()) > 0.0
         np.testing.assert_allclose(values, exact, rtol=0, atol=float(exact.max()) / 30_000)
-    (said,) = re.findall(r"at the end ([\d.]+ m?m)\.$", text_of(opened, "history-summary"))
+    summary = text_of(opened, "history-summary")
+    (fastest,) = re.findall(r"Largest velocity ([\d.]+) m/s;", summary)
+    assert float(fastest) == pytest.approx(max(drawn[1]), rel=1e-4)
+    (said,) = re.findall(r"at the end ([\d.]+ m?m)\.$", summary)
     assert said == f"{drawn[2][-1]:.{len(said.split()[0].partition('.')[2])}f} mm"
 
 
@@ -165,3 +176,80 @@ def test_map_colours_are_the_dataset(opened: Any) -> None:
     rows = ((np.arange(23) + 0.5) * seen.shape[0] / 23).astype(int)
     columns = ((np.arange(18) + 0.5) * seen.shape[1] / 18).astype(int)
     np.testing.assert_allclose(seen[np.ix_(rows, columns)], np.where(mm > 0, mm, np.nan), rtol=1e-6)
+
+
+def test_the_summary_of_the_map_is_its_dataset_in_words(opened: Any, result: Path) -> None:
+    """Counts of cells by kind and the range of the displacements, for those who do not see the picture."""
+    names = [(flag.name or "").lower() for flag in CAUTIONS]
+    for theta, mu_s in ((1, 0), (2, 0)):
+        move(opened, theta, mu_s)
+        with xr.open_dataset(result, mask_and_scale=False) as data:
+            cells = data.isel(theta=theta, mu_s=mu_s).load()
+        u = cells.permanent_displacement
+        caution = flags(cells).to_array().sel(variable=names).any("variable") & (u > 0.0)
+        counts = {
+            "without displacement": u == 0.0,
+            "without a value": u.isnull(),
+            "with a caution": caution,
+            "upslope": u < 0.0,
+        }
+        words = [f", {int(one.sum())} {text}" for text, one in counts.items() if one.any()]
+        expected = (
+            "peak ground acceleration A (m/s²) over excitation frequency f (Hz). "
+            f"{u.size} cells{''.join(words)}"
+        )
+        summary = text_of(opened, "map-summary")
+        assert summary.startswith(expected)
+        ends = re.findall(r"; from ([\d.]+) (m+) to ([\d.]+) (m+)\.$", summary)
+        assert bool(ends) == bool((u > 0.0).any())
+        for low, low_unit, high, high_unit in ends:
+            metres = {"mm": 1e-3, "m": 1.0}
+            slides = u.where(u > 0.0)
+            assert float(low) * metres[low_unit] == pytest.approx(float(slides.min()), rel=6e-4)
+            assert float(high) * metres[high_unit] == pytest.approx(float(slides.max()), rel=6e-4)
+
+
+def test_the_other_layer_is_newmarks_block(opened: Any, result: Path) -> None:
+    """Its colours, its title, and the line of the readout."""
+    move(opened, 1, 0)
+    opened.execute_script(
+        "const list = document.getElementById('layer');"
+        "list.selectedIndex = 1; list.dispatchEvent(new Event('change'))"
+    )
+    try:
+        assert text_of(opened, "map-title") == RESULTS["newmark_displacement"]["long_name"]
+        shape, values = opened.execute_script(
+            FOUND + "const d = found('colours').data.image[0]; return [d.shape, [...d]]"
+        )
+        seen = np.reshape(np.array(values, float), shape)
+        with xr.open_dataset(result) as data:
+            mm = 1000.0 * data.newmark_displacement.isel(theta=1, mu_s=0).values
+        rows = ((np.arange(23) + 0.5) * seen.shape[0] / 23).astype(int)
+        columns = ((np.arange(18) + 0.5) * seen.shape[1] / 18).astype(int)
+        expected = np.where(mm > 0, mm, np.nan)
+        np.testing.assert_allclose(seen[np.ix_(rows, columns)], expected, rtol=1e-6)
+    finally:
+        show(opened, result.with_suffix(".html"))
+
+
+def test_zoom_shows_a_part_about_the_chosen_cell(opened: Any) -> None:
+    """Half of both axes, on the scale of each; the whole map again."""
+
+    def ranges() -> np.ndarray:
+        script = "const r = ['x_range', 'y_range'].map(found); return r.map((one) => [one.start, one.end])"
+        return np.array(opened.execute_script(FOUND + script))
+
+    move(opened, 1, 0)
+    whole = ranges()
+    step = np.log10(50) / 17
+    np.testing.assert_allclose(np.log10(whole[0]), [np.log10(0.2) - step / 2, 1 + step / 2])
+    np.testing.assert_allclose(whole[1], [0.75, 12.25])
+    opened.execute_script("document.getElementById('zoom-in').click()")
+    part = ranges()
+    assert np.ptp(np.log10(part[0])) == pytest.approx(0.5 * np.ptp(np.log10(whole[0])))
+    assert np.ptp(part[1]) == pytest.approx(0.5 * np.ptp(whole[1]))
+    _, _, amplitude, frequency = chosen(opened)
+    assert part[0][0] < AXES[3][frequency] < part[0][1]
+    assert part[1][0] < AXES[2][amplitude] < part[1][1]
+    opened.execute_script("document.getElementById('zoom-whole').click()")
+    np.testing.assert_allclose(ranges(), whole)

@@ -35,7 +35,7 @@ def test_result_without_a_map_is_refused(tmp_path: Path, text: str, message: str
     assert not output.exists()
 
 
-def test_command(result: Path, tmp_path: Path) -> None:
+def test_explore_says_what_it_shows_and_what_it_refuses(result: Path, tmp_path: Path) -> None:
     done = command(tmp_path, "explore", str(result), "-o", "page.html")
     assert done.returncode == 0, done.stderr
     assert "23 values" in done.stdout

@@ -122,7 +122,7 @@ def test_a_dimension_that_no_variable_has_is_left_out(tmp_path: Path) -> None:
     np.testing.assert_allclose(table.limiting_acceleration, eq7, rtol=1e-6)
 
 
-def test_words(folder: Path, tmp_path: Path) -> None:
+def test_codes_are_spelled_out_on_request(folder: Path, tmp_path: Path) -> None:
     codes = tmp_path / "codes.csv"
     words = tmp_path / "words.csv"
     for path, wanted in ((codes, False), (words, True)):
@@ -156,7 +156,7 @@ def test_a_parquet_file_tells_how_it_was_made(folder: Path, tmp_path: Path) -> N
     )
 
 
-def test_the_command(folder: Path) -> None:
+def test_export_writes_the_rows_that_it_counts(folder: Path) -> None:
     done = command(
         folder, "export", "cases.nc", "-o", "cases.csv", "--words", "--variable", "sliding_mode"
     )
@@ -466,7 +466,7 @@ def test_what_has_no_flags(data: xr.Dataset | xr.DataArray, message: str) -> Non
         slipsweep.flags(data)
 
 
-def test_words_of_one_cell(folder: Path, tmp_path: Path) -> None:
+def test_one_cell_is_a_table_of_one_row(folder: Path, tmp_path: Path) -> None:
     """A file without dimensions is a table of one row."""
     cell = tmp_path / "cell.nc"
     path = tmp_path / "t.csv"

@@ -3,6 +3,7 @@
 import math
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from slipsweep.files import running, spec, storing
 from slipsweep.files.jobs import Job, limit_job, sweep_job
 from slipsweep.files.opening import read_result
 from slipsweep.grid.tally import tally_of
+from tests.support.made_up_records import write_motion
 
 GRID = """
 [axes]
@@ -47,12 +49,6 @@ axes.frequency.values = [1, 2]
     "samples": WAVE
     + "[uncertainty]\nsamples = 16\ndecay_rate = {distribution = 'lognorm', s = 0.3, scale = 2.0}\n",
 }
-
-
-def write_motion(path: Path, seed: int, count: int, interval: float) -> None:
-    values = 0.3 * np.random.default_rng(seed).normal(size=count) * np.hanning(count)
-    rows = (f"{at * interval:.6g},{value:.6g}\n" for at, value in enumerate(values))
-    path.write_text("time,acceleration\n" + "".join(rows))
 
 
 @pytest.fixture
@@ -187,6 +183,38 @@ def test_a_run_goes_on_with_its_own_chunks_only(
     assert read_result(path).attrs["model"] == "newmark"
 
 
+def test_a_run_goes_on_with_other_memory_if_its_chunks_fit(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Chunks keep the size that the run was begun with; less memory than they take is refused."""
+    monkeypatch.setattr(running, "_BASE_MEMORY", 0)
+    cell = 2 * (8 + 8 + 1 + 2) + 8  # two copies of the default results, and 8 bytes
+    (folder / "sweep.toml").write_text(WAVE.replace("num = 4", "num = 400"))
+    path = folder / "a.nc"
+    mark = storing._mark
+
+    def failing(place: str, number: int) -> None:
+        if number == 2:
+            raise OSError(28, "No space left on device")
+        mark(place, number)
+
+    monkeypatch.setattr(storing, "_mark", failing)
+    with pytest.raises(RunError, match="No space"):
+        stored(job_of(folder, "sweep"), path, memory=2400 * cell)
+    marked: list[int] = []
+    monkeypatch.setattr(storing, "_mark", lambda place, number: marked.append(number))
+    with pytest.raises(
+        InputError, match="larger chunks than fit into the memory asked for; give more --memory"
+    ):
+        stored(job_of(folder, "sweep"), path, resume=True, memory=1000 * cell)
+    assert not stored(job_of(folder, "sweep"), path, resume=True, memory=7200 * cell).found
+    assert marked == [2]
+    stored(job_of(folder, "sweep"), folder / "whole.nc")
+    xr.testing.assert_identical(
+        without_time(read_result(path)), without_time(read_result(folder / "whole.nc"))
+    )
+
+
 def test_another_motion_is_another_run(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     stored(job_of(folder, "suite"), folder / "a.nc")
     (folder / "motions" / "m2.csv").rename(folder / "motions" / "m3.csv")
@@ -297,7 +325,7 @@ def packed(table: xr.Dataset) -> xr.Dataset:
 
 
 #: What other programs do to a file, and leave its meaning.
-EDITS = {
+EDITS: dict[str, Callable[[xr.Dataset], xr.Dataset]] = {
     "packed": packed,
     "transposed": lambda table: table.transpose(*reversed(table.permanent_displacement.dims)),
     "codes as numbers": lambda table: table.assign(sliding_mode=table.sliding_mode.astype(float)),

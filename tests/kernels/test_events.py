@@ -13,7 +13,7 @@ from slipsweep.kernels import events
 from slipsweep.kernels.block import UNSOLVED
 
 
-@numba.njit(error_model="numpy")
+@numba.njit(error_model="numpy")  # type: ignore[untyped-decorator]
 def _power(where: tuple[float, float], x: float) -> tuple[float, float]:
     root, power = where
     return math.copysign(abs(x - root) ** power, x - root), power * abs(x - root) ** (power - 1.0)

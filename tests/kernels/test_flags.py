@@ -113,14 +113,14 @@ def test_under_the_literal_rise_yield_does_not_govern(motion: str) -> None:
     """Eq. 4 below Üy is followed there: the result depends on λ, whose estimate is named, and is not Newmark's."""
     times = np.arange(21) / 4.0
     triangle = slipsweep.Record(times, 3.7 * np.array([0.0, *[1.0, 0.0, -1.0, 0.0] * 5]))
-    shaking: dict[str, Any] = {
+    shakings: dict[str, dict[str, Any]] = {
         "sine": {"frequency": 1.0, "amplitude": 3.7},
         "triangle": {"frequency": 1.0, "amplitude": 3.7, "excitation": "triangle"},
         "step": {"frequency": 1.0, "amplitude": 3.7, "solver": "step"},
         "record": {"excitation": triangle},
-    }[motion]
+    }
     literal = slipsweep.Mendez(rise="literal")
-    block: dict[str, Any] = {"theta": 12.0, "mu_s": 0.45, **shaking}
+    block: dict[str, Any] = {"theta": 12.0, "mu_s": 0.45, **shakings[motion]}
     monotone = slipsweep.sweep(**block)
     found = slipsweep.sweep(**block, model=literal)
     other = slipsweep.sweep(**block, decay_rate=3.0, model=literal)

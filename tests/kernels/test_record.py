@@ -18,7 +18,7 @@ from slipsweep.motion.cutting import wave_of_record
 from tests.support.block import Interface
 from tests.support.cases import choices
 from tests.support.digits import workdps
-from tests.support.made_up_records import SEEN, difference, made
+from tests.support.made_up_records import SEEN, band_noise, difference, made
 from tests.support.reference import RecordSolution, solve_record
 from tests.support.sections import sections_of_record
 
@@ -39,13 +39,7 @@ def displacement(record: Record, **given: Any) -> float:
 
 @pytest.fixture(scope="module")
 def shaking() -> Record:
-    """Noise with a band and an envelope of earthquakes: pulses of all sizes, several maxima each."""
-    rng = np.random.default_rng(7)
-    times = np.arange(0.0, 20.0, 0.01)
-    phases = rng.uniform(0, 2 * pi, 60)
-    bands = np.sin(2 * pi * np.linspace(0.3, 9.0, 60)[:, None] * times + phases[:, None]).sum(0)
-    wave = bands * (times / 4) ** 2 * np.exp(-times / 2.5)
-    return Record(times, 6.0 * wave / np.abs(wave).max())
+    return band_noise()
 
 
 # ------------------------------------------------------------------------- a linear piece
@@ -66,7 +60,9 @@ def _follow(decay: float, x: float, change: float) -> tuple[float, float]:
     """Gains under Eq. 4 on a record of one piece, a second long."""
     pieces = wave_of_record(Record.sampled([x, x + change], 1.0), 1.0).pieces
     assert pieces.shape[0] == 1
-    return _followed((tan(radians(8.0)), 0.4, 1.0, 1.0, decay, 0.1, 0.1), pieces)
+    cell = (tan(radians(8.0)), 0.4, 1.0, 1.0, decay, 0.1, 0.1)
+    gains: tuple[float, float] = _followed(cell, pieces)
+    return gains
 
 
 def _exact(decay: float, x: float, change: float) -> tuple[mpfr, mpfr]:
@@ -257,6 +253,21 @@ def test_a_sample_of_zero_in_a_negative_half_wave_does_not_end_continuous_slidin
     record = Record.sampled([0.0, 6.0, -1.0, touch, -1.0, 6.0, -6.0, 0.0], 0.1)
     expected = assert_is_reference(record, cell)
     assert float(expected.permanent_displacement) == pytest.approx(0.2968, abs=5e-5)
+
+
+def test_the_largest_velocity_may_be_beyond_the_positive_peak_on_the_negative_side() -> None:
+    """D = 0 at Üg = −(g/λ) ln 1.5 = −6.98 m/s², where v turns; the positive peak is 6 m/s²."""
+    times = np.array([0.0, 0.05, 0.1, 1.1, 1.15])
+    record = Record(times, np.array([0.0, 6.0, 0.0, -10.0, 0.0]))
+    cell = {
+        "theta": 0.0,
+        "mu_s": 0.5,
+        "yield_acceleration": 0.1,
+        "decay_rate": 0.57,
+        "delta_mu": 0.25,
+    }
+    expected = assert_is_reference(record, cell)
+    assert float(expected.peak_relative_velocity) == pytest.approx(0.6694, abs=5e-5)
 
 
 def test_zero_over_an_interval_ends_continuous_sliding() -> None:

@@ -1,5 +1,6 @@
 """Time histories: what they have in common with a sweep, a waveform and mechanics; slides that last long."""
 
+import os
 import subprocess
 import sys
 from typing import Any
@@ -10,6 +11,7 @@ import pytest
 import slipsweep
 from slipsweep import InputError, Mendez, Record, Sine, simulate, sweep
 from slipsweep.model.variables import DEFAULT_RECORD_RESULTS, HISTORY
+from tests.support.made_up_records import band_noise
 
 #: Shaking that leaves Newmark's block with a velocity.
 SHAKEN: dict[str, Any] = {
@@ -162,13 +164,7 @@ MODELS: dict[str, Any] = {
 
 @pytest.fixture(scope="module")
 def shaking() -> Record:
-    """Noise with a band and an envelope of earthquakes: pulses of all sizes, several maxima each."""
-    rng = np.random.default_rng(7)
-    times = np.arange(0.0, 20.0, 0.01)
-    phases = rng.uniform(0, 2 * np.pi, 60)
-    bands = np.sin(2 * np.pi * np.linspace(0.3, 9.0, 60)[:, None] * times + phases[:, None]).sum(0)
-    wave = bands * (times / 4) ** 2 * np.exp(-times / 2.5)
-    return Record(times, 6.0 * wave / np.abs(wave).max())
+    return band_noise()
 
 
 def case_of(seed: int) -> dict[str, Any]:
@@ -330,6 +326,7 @@ except KeyboardInterrupt:
 """
 
 
+@pytest.mark.skipif(os.name != "posix", reason="sends signals")
 def test_a_history_of_many_cycles_hears_ctrl_c() -> None:
     done = subprocess.run(
         [sys.executable, "-c", ENDLESS], capture_output=True, text=True, check=False

@@ -34,7 +34,7 @@ def suite_result(displacement: Any, validity: Any, dims: tuple[str, ...]) -> xr.
     return xr.Dataset(data, coords, {"g": 9.81, "suite": "made up"})
 
 
-def test_by_hand() -> None:
+def test_zeros_missing_values_and_rounding_in_statistics_by_hand() -> None:
     """Rows: some zeros; all zeros; no values; one value; one non-zero value."""
     nan = np.nan
     values = [
@@ -84,7 +84,7 @@ def test_by_hand() -> None:
 
 
 @pytest.mark.parametrize("over", [None, "motion", ["motion", "polarity", "theta"]])
-def test_beside_numpy(over: Any) -> None:
+def test_statistics_are_numpys_of_each_grid_point(over: Any) -> None:
     """Random displacements, a third zero and a fifth missing; polarity is part of the suite unless told otherwise."""
     rng = np.random.default_rng(11)
     dims = ("theta", "polarity", "mu_s", "motion")
@@ -123,7 +123,7 @@ def test_beside_numpy(over: Any) -> None:
     )
 
 
-def test_of_a_sweep() -> None:
+def test_statistics_of_a_sweep_count_steep_and_flat_slopes() -> None:
     """A steep slope has no value, a flat one does not slide; what xarray computes is the same."""
     motions = [
         Record.sampled(np.random.default_rng(i).normal(size=200) * np.hanning(200), 0.02, f"n{i}")
@@ -161,7 +161,7 @@ def test_of_a_sweep() -> None:
         ({"zero": "2 s"}, 'zero = "2 s": must be a number, with a unit that converts to m'),
     ],
 )
-def test_what_is_refused(given: dict[str, Any], message: str) -> None:
+def test_statistics_of_no_suite_are_refused(given: dict[str, Any], message: str) -> None:
     result = suite_result([[0.1, 0.2]], [[0, 0]], ("mu_s", "motion"))
     with pytest.raises(InputError, match=message):
         suite_statistics(result, **given)

@@ -258,6 +258,23 @@ def test_factor_on_an_estimate(name: str) -> None:
     assert not np.allclose(plain.mean_displacement, found.mean_displacement, rtol=1e-3)
 
 
+@pytest.mark.parametrize("name", ["decay_rate", "delta_mu", "minimum_friction"])
+def test_a_factor_on_an_estimate_that_fails_has_no_value(name: str) -> None:
+    """λ by Eq. 6 is negative: the block has a flag and no displacement, not 0, whatever is drawn about it."""
+    block: dict[str, Any] = {"theta": 0.0, "mu_s": 1.5, "amplitude": 14.0}
+    block["yield_acceleration"] = 1.0
+    estimate = slipsweep.friction_parameters(**block)
+    assert estimate.decay_rate < 0.0
+    about = {"distribution": "uniform", "loc": 0.9, "scale": 0.2, "kind": "factor"}
+    found = slipsweep.sample(**block, frequency=1.0, uncertain={name: about}, samples=64)
+    assert found.valueless_share == 1.0
+    assert found.flag_share.sel(flag=slipsweep.Validity.FRICTION_NOT_DECAYING) == 1.0
+    assert found.mode_share.sum() == 0.0
+    assert found.mean_displacement.isnull()
+    assert found.displacement_quantile.isnull().all()
+    assert found.exceedance_probability.isnull().all()
+
+
 def test_correlation_of_normal_scores() -> None:
     uncertain = {
         "mu_s": {**LOGNORMAL, "scale": 0.4},

@@ -1,9 +1,12 @@
 """Helpers of the tests of charts: what is drawn in a figure, and the grids that are drawn."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.path import Path as Outline
 
 import slipsweep
 from slipsweep.charts import kinds
@@ -16,6 +19,11 @@ SWEEP_KINDS = list(kinds.kinds_of("sweep"))
 
 #: A lined slope: the interface is weak, the block does not come to rest, and ends upslope.
 LINED_SINE = slipsweep.Sine(cycles=15)
+
+SWEEPS = Path(__file__).parents[2] / "sweeps"
+
+#: Peak ground accelerations at which no motion slides, some do, and all do, m/s².
+SUITE_AMPLITUDES = np.array([1.0, 2.5, 4.0, 6.0])
 
 
 def named(figure: Figure, gid: str) -> list[Any]:
@@ -38,6 +46,26 @@ def caption(figure: Figure) -> str:
 
 
 def inside(area: Any, cells: Any) -> Any:
-    """Which points a filled area covers, those on its edge among them."""
+    """Which points a filled area covers, those on its edge among them, where it is not clipped."""
     (path,) = area.get_paths()
-    return path.contains_points(cells, radius=1e-9) | path.contains_points(cells, radius=-1e-9)
+    covered = _contains(path, cells)
+    if area.get_clip_path() is not None:
+        region = area.get_clip_path().get_fully_transformed_path()
+        covered &= _contains(region, area.axes.transData.transform(cells))
+    return covered
+
+
+def _contains(path: Outline, points: Any) -> Any:
+    return path.contains_points(points, radius=1e-9) | path.contains_points(points, radius=-1e-9)
+
+
+def drawn_as(figure: Figure, text: str) -> list[Any]:
+    """Lines of a chart's first axes that look as an entry of the legend: colour, dash and marker."""
+    texts = [entry.get_text() for entry in figure.legends[0].get_texts()]
+    entry = figure.legends[0].legend_handles[texts.index(text)]
+    return [line for line in figure.axes[0].lines if _look(line) == _look(entry)]
+
+
+def _look(line: Any) -> tuple[Any, ...]:
+    marker = str(line.get_marker()).replace("None", "")  # both are no marker
+    return to_hex(line.get_color()), line.get_linestyle(), marker, line.get_linewidth()

@@ -51,6 +51,8 @@ class SlipsweepAccessor:
         show_cautions: bool = False,
         width: float | str | None = None,
         grey: bool = False,
+        title: str | None = None,
+        caption: Literal["full", "short"] | None = None,
         ax: "Axes | None" = None,
     ) -> "Figure | Axes":
         """Draw a chart, as `slipsweep chart` does.
@@ -90,6 +92,11 @@ class SlipsweepAccessor:
             smaller.
         grey : bool
             Draw without colour.
+        title : str, optional
+            A title of your own.
+        caption : {"full", "short"}, optional
+            In full, or without the options of the model, the equations of the estimates, the ratio
+            to Newmark's block and the version; by default short where the width is below 127 mm.
         ax : matplotlib.axes.Axes, optional
             Axes to draw a chart of one panel in, with its legend and caption.
 
@@ -126,6 +133,8 @@ class SlipsweepAccessor:
             show_cautions=show_cautions,
             width=width,
             grey=grey,
+            title=title,
+            caption=caption,
             ax=ax,
         )
         return figure if ax is None else ax

@@ -172,7 +172,7 @@ def spread(result: Result, options: style.Options) -> Figure:
         _underlay(sheet, panel)
         _mark_accelerations(sheet, panel)
     sheet.note_left_out(solved.DISPLACEMENT, *flags)
-    sheet.notes.append(
+    sheet.note(
         "All results have the same Üy; λ = 2 to 3 is what the paper measured on its interface."
     )
     return sheet.done()
@@ -254,8 +254,8 @@ def _underlay(sheet: Sheet, panel: Panel) -> None:
     drawn = panel.data["drawn"]
     flagged = (drawn > 0) & solved.has_flags(panel.data["validity"], CAUTIONS)
     seen = sheet.data["validity"].where(sheet.data["drawn"] > 0)
-    names = [style.flag_name(flag) for flag in CAUTIONS if solved.has_flags(seen, flag).any()]
-    marks = [("caution", "caution:\n" + "\n".join(names), _CAUTION, flagged)]
+    words = [style.FLAG_TEXT[flag] for flag in CAUTIONS if solved.has_flags(seen, flag).any()]
+    marks = [("caution", "\n".join(words), _CAUTION, flagged)]
     if "unsound" in panel.data:
         text = style.UNSOUND if "newmark" in panel.data else "falls with A"
         marks.append(("unsound", text, _UNSOUND, panel.data["unsound"]))

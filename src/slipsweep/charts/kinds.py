@@ -68,6 +68,7 @@ def check_kind(kind: str) -> str:
 
 def fitting(result: Result, options: Options) -> list[str]:
     """The kinds that are drawn of a result if none is named; with one axis left, its curve."""
+    result.check_axes()
     kinds = kinds_of(result.sort)
     if result.sort != "sweep":
         return [
@@ -99,6 +100,7 @@ def draw(result: Result, kind: str | None, options: Options) -> Figure:
     for name in ("at", "x", "y", "panels", "levels"):
         if getattr(options, name) and not result.dims:
             raise InputError(f"{result.name}: --{name}: not with {kind}, which is drawn as a whole")
+    result.check_axes()
     with mpl.rc_context({"font.size": options.font}):
         try:
             return kinds[kind](result, options)
@@ -184,7 +186,8 @@ def title_page(result: Result) -> Figure:
     if not solved.is_recorded(result.data):
         left_out = "; left out of contours and curves unless their caption says that it is drawn"
         sections["Flags that the charts hatch"] = [
-            f"{style.flag_name(flag)} ({flag.kind}): {flag.text}{left_out if flag in solved.LEFT_OUT else ''}"
+            f"{style.FLAG_TEXT[flag]}: {style.flag_name(flag)} ({flag.kind}): {flag.text}"
+            f"{left_out if flag in solved.LEFT_OUT else ''}"
             for flag in maps.HATCHES
         ]
     sections["Origin"] = [

@@ -49,9 +49,9 @@ def limit(result: Result, options: Options) -> Figure:
     # one scale for all, from zero; only now, for it ends the autoscaling
     sheet.panels[0].axes.set_ylim(bottom=0.0)
     if not np.isfinite(sheet.data["limit_amplitude"]).any():
-        sheet.notes.append("No limits to draw: limit_status has the reasons.")
+        sheet.note("No limits to draw: limit_status has the reasons.")
     if suite:
-        sheet.notes.append(_suite_text(sheet.data))
+        sheet.note(_suite_text(sheet.data))
     return sheet.done()
 
 

@@ -33,6 +33,9 @@ _CURVES = 6
 _PANELS = 3
 _POINTS = 600
 
+#: What draws a cell that no axis is left for.
+_OF_ONE_CELL = "slipsweep simulate draws the time history of one cell"
+
 #: What is kept of an axis: a slice of it, or places, some of which may lie between its values.
 Kept = slice | Sequence[Place]
 
@@ -97,6 +100,13 @@ class Result:
             *self.wide,
             *(dim for dim in NAMED if dim in self.dims and self.data.sizes[dim] > 1),
         ]
+
+    def check_axes(self) -> None:
+        """Refuse the result of a sweep that has no axis to draw a chart over (InputError)."""
+        if self.sort in ("sweep", "record") and not self.wide:
+            raise InputError(
+                f"{self.name}: no axis has two values or more, which charts need; {_OF_ONE_CELL}"
+            )
 
     def result(self, name: str) -> str:
         """`name` if it is a result in the file (InputError otherwise, naming those there are)."""
@@ -289,9 +299,10 @@ class Result:
         found = next((dim for dim in (*preferred, *free) if dim in free), None)
         if found is None:
             fixed = f"; --at fixes {', '.join(options.at)}" if options.at else ""
+            hint = "" if more else f"; {_OF_ONE_CELL}"
             raise InputError(
                 f"{self.name}: this chart needs {'another' if more else 'an'} axis with two values or more{more}; "
-                f"there are: {', '.join(there) or 'none'}{fixed}"
+                f"there are: {', '.join(there) or 'none'}{fixed}{hint}"
             )
         return found
 

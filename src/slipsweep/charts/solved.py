@@ -97,17 +97,33 @@ def thresholds(data: xr.Dataset, always: bool = False) -> xr.Dataset:
     """
     if is_recorded(data) and "half_wave_peak" not in data:
         return xr.Dataset()
+    lines = boundaries(data, always)
+    return lines.drop_vars("rest_angle").where(lines["rest_angle"] > 0)
+
+
+def boundaries(data: xr.Dataset, always: bool = False) -> xr.Dataset:
+    """As `thresholds`, also where the block slides under its own weight, and ``rest_angle``, degrees.
+
+    The angle, arctan(Üy/g), is by how much the base may be steeper before the block slides under
+    its own weight: φ − θ with Coulomb's Üy.  Between cells on either side of this limit, where the
+    angle is 0, the other two go on smoothly.
+    """
     g = float(data.attrs["g"])
+    lines = {}
     if "yield_coefficient" in data.coords:
-        return xr.Dataset({"yield_line": data["yield_coefficient"] * g}).reset_coords(drop=True)
-    given = {name: _bare(data[name]) for name in _BLOCK if name in data.coords}
-    # neither depends on the amplitude, nor on what it is taken for otherwise
-    found = friction_parameters(
-        amplitude=0.0, delta_mu=0.0, decay_rate=0.0, model=Mendez(g=g), **given
-    )
-    lines = {"yield_line": found["yield_acceleration"].where(lambda onset: onset > 0)}
-    if always or not is_newmark(data):
-        lines["limit_line"] = found["limiting_acceleration"].where(found["validity"] == 0)
+        onset = data["yield_coefficient"] * g
+    else:
+        given = {name: _bare(data[name]) for name in _BLOCK if name in data.coords}
+        # neither depends on the amplitude, nor on what it is taken for otherwise
+        found = friction_parameters(
+            amplitude=0.0, delta_mu=0.0, decay_rate=0.0, model=Mendez(g=g), **given
+        )
+        onset = found["yield_acceleration"]
+        if always or not is_newmark(data):
+            undefined = has_flags(found["validity"], Validity.LIMIT_UNDEFINED)
+            lines["limit_line"] = found["limiting_acceleration"].where(~undefined)
+    lines["yield_line"] = onset
+    lines["rest_angle"] = xr.apply_ufunc(lambda ratio: np.degrees(np.arctan(ratio)), onset / g)
     return xr.Dataset(lines).reset_coords(drop=True)
 
 
@@ -137,8 +153,9 @@ def unsound(
 ) -> tuple[xr.DataArray, str]:
     """Where the displacements `drawn` of a slice have a trend that no block has, and the trends and shares in words.
 
-    One is smaller than at an amplitude that is 1 % smaller, of recorded motions than at the next
-    smaller amplitude of the slice; or it is less than half of that of Newmark's block, `theirs`.
+    One is smaller than at an amplitude that is 1 % smaller, which is solved for each cell, of
+    recorded motions than at the next smaller amplitude of the slice; or it is less than half of
+    that of Newmark's block, `theirs`.
     """
     ours = data[DISPLACEMENT]
     drive = next(
@@ -181,19 +198,23 @@ def unsound_texts(results: xr.Dataset) -> list[str]:
         return []
     how = (results.attrs.get("waveform"), results.attrs.get(SOLVERS.attribute, "cycle"))
     others = not is_recorded(results) and how != ("sine", "cycle")
-    some = results
-    while some[DISPLACEMENT].size > (_LOOKED_AT_OTHERS if others else _LOOKED_AT):
-        sizes = some[DISPLACEMENT].sizes
-        some = some.isel({max(sizes, key=lambda dim: sizes[dim]): slice(1, None, 2)})
-    counted = (
-        "" if some is results else f" (counted in {some[DISPLACEMENT].size} cells, evenly spaced)"
-    )
+    some, counted = _counted(results, _LOOKED_AT_OTHERS if others else _LOOKED_AT)
     some = some.load()
     drawn = reliable(some, DISPLACEMENT)
     texts = [unsound(some.assign({DISPLACEMENT: drawn}), drawn, newmark(some))[1]]
     if {"sliding_mode", "validity"} <= {*some}:
         texts.append(estimated(some, drawn, some["sliding_mode"] == SlidingMode.CONTINUOUS))
     return [text + counted for text in texts if text]
+
+
+def _counted(results: xr.Dataset, most: int) -> tuple[xr.Dataset, str]:
+    """Results of at most so many cells, evenly spaced, and what to say of it if these are not all."""
+    some = results
+    while some[DISPLACEMENT].size > most:
+        sizes = some[DISPLACEMENT].sizes
+        some = some.isel({max(sizes, key=lambda dim: sizes[dim]): slice(1, None, 2)})
+    cells = some[DISPLACEMENT].size
+    return some, "" if some is results else f" (counted in {cells} cells, evenly spaced)"
 
 
 def estimated(data: xr.Dataset, drawn: xr.DataArray, continuous: xr.DataArray) -> str:

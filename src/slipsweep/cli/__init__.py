@@ -59,12 +59,29 @@ def _show_version(requested: bool) -> None:
         raise typer.Exit
 
 
+def _show_versions(requested: bool) -> None:
+    if requested:
+        from slipsweep.cli import versions
+
+        echo(*versions.lines())
+        raise typer.Exit
+
+
 @app.callback(cls=_Commands)
 def _options(
     version: Annotated[
         bool,
         typer.Option(
             "--version", callback=_show_version, is_eager=True, help="Show the version and exit."
+        ),
+    ] = False,
+    versions: Annotated[
+        bool,
+        typer.Option(
+            "--versions",
+            callback=_show_versions,
+            is_eager=True,
+            help="Show all versions, for a report of a fault, and exit.",
         ),
     ] = False,
 ) -> None:

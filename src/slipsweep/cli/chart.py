@@ -53,6 +53,11 @@ def chart(
     ] = False,
     width: Annotated[Text, LOOK("Width of the figure: 90mm, 3.5inch.", "LENGTH")] = None,
     grey: Annotated[bool, LOOK("Draw without colour.", None, "--grey")] = False,
+    title: Annotated[Text, LOOK("A title of your own.", "TEXT")] = None,
+    caption: Annotated[
+        Literal["full", "short"] | None,
+        LOOK("Caption: in full, or short (default: short below 127 mm)."),
+    ] = None,
     output: Annotated[
         options.Paths,
         written(
@@ -77,7 +82,7 @@ def chart(
         result = slices.Result(data, file)
         axes = selection.own_names(data, typed)
         look = style.Options(
-            x, y, axes, across, variable, heights, units, show_cautions, width, grey
+            x, y, axes, across, variable, heights, units, show_cautions, width, grey, title, caption
         )
         result.places(look.at)
         chosen = requested or kinds.fitting(result, look)

@@ -1,7 +1,7 @@
 """`slipsweep hazard`: the mean annual rate at which a displacement is exceeded."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from slipsweep.cli import common, options
 from slipsweep.cli.common import FIGURES, echo
@@ -37,6 +37,10 @@ def hazard(
     site: Annotated[
         int | None, HAZARD("Which site of an OpenQuake file with several, from 1.", "N")
     ] = None,
+    unstated: Annotated[
+        Literal["refuse", "accept"],
+        HAZARD("A curve that does not say PGA, or annual: refused, or taken as such."),
+    ] = "refuse",
     at: options.At = None,
     output: Annotated[
         options.Paths,
@@ -78,7 +82,7 @@ def hazard(
     result = chosen.squeeze([name for name in typed if name in chosen.sizes])
     g = float(table.attrs["g"])
     lengths = options.displacements(displacement, g)
-    given = read_hazard_curve(curve, g, site)
+    given = read_hazard_curve(curve, g, site, unstated)
     rates = displacement_hazard(result, given, lengths)
     drawn = rates
     if any(path.suffix in FIGURES for path in paths):

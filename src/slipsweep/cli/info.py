@@ -28,6 +28,7 @@ def info(
     from slipsweep.files import jobs, motions, opening, selection, storing
     from slipsweep.grid.tally import tally_of
     from slipsweep.motion.records import Record
+    from slipsweep.motion.suites import Suite
 
     table = opening.read_result(file)
     echo(f"{Path(file)}  {size_text(storing.nbytes_of(opening.place_of(file)))}")
@@ -44,6 +45,8 @@ def info(
         echo(f"record: {recorded.summary()}")
     if rows := opening.motions_text(table):
         echo("motions, as recorded:", *(f"  {row}" for row in rows))
+    if isinstance(recorded, Suite):
+        echo(*recorded.cautions())
     try:
         common.echo_tally(tally_of(table))
     except InputError as error:

@@ -124,7 +124,8 @@ def displacements(texts: Sequence[str], g: float) -> list[float]:
                 f"--displacement = {text}: without a unit that is {length:g} m; {units}"
             )
         found.add(length)
-    return check_values("displacement", sorted(found), "--displacement").tolist()
+    values = check_values("displacement", sorted(found), "--displacement")
+    return [float(value) for value in values]
 
 
 def in_own_units(typed: Mapping[str, Any], g: float) -> dict[str, Any]:

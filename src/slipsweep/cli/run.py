@@ -5,7 +5,7 @@ import time
 import tomllib
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from slipsweep.cli import common, options
 from slipsweep.cli.common import echo, range_text
@@ -14,6 +14,12 @@ from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files import outputs
 from slipsweep.model import variables
 from slipsweep.model.options import SOLVERS
+
+if TYPE_CHECKING:
+    from slipsweep.files.spec import SweepSpec
+
+#: Factor on a recorded acceleration above which a motion is far from what was recorded.
+_LARGE_FACTOR = 4.0
 
 
 @options.command("Start", "slipsweep example", "slipsweep example paper")
@@ -137,6 +143,7 @@ def run(
             echo(f"  {parameter:<24}{range_text(str(parameter), ends, checked.model.g)}")
     if checked.recorded is not None:
         echo(checked.recorded.summary())
+        echo(*filter(None, [_scaling_caution(checked)]))
     if "duplicate_motions" in template.attrs:
         echo(f"the same motion under several labels: {template.attrs['duplicate_motions']}")
     common.echo_tally(report.tally)
@@ -145,3 +152,23 @@ def run(
     echo(*(f"unsound: {text}" for text in solved.unsound_texts(result)))
     common.echo_suite(result, most=20)
     echo(f"{report.path}  {size_text(storing.nbytes_of(report.path))}")
+
+
+def _scaling_caution(spec: "SweepSpec") -> str | None:
+    """A line on recorded motions that are scaled by large factors; None where none is."""
+    from slipsweep.grid.inputs import Inputs
+    from slipsweep.grid.plans import plan_sweep
+
+    # the factor depends on these alone; a block has to be given, whichever it is
+    names = (*variables.STRENGTHS, "time_scale", "azimuth")
+    inputs = Inputs(theta=0.0, mu_s=1.0, **{name: getattr(spec.inputs, name) for name in names})
+    plan = plan_sweep(inputs, excitation=spec.excitation, variables=["motion_factor"])
+    factors = plan.solve()["motion_factor"]
+    largest = factors.max(set(factors.dims) - {"motion"})
+    if not (largest > _LARGE_FACTOR).any():
+        return None
+    scaled = f"scale factors above {_LARGE_FACTOR:g}, up to {largest.max().item():.3g}"
+    if "motion" in largest.dims:
+        labels = largest["motion"].values[largest.values > _LARGE_FACTOR]
+        scaled = f"{scaled}: {', '.join(labels)}"
+    return f"{scaled}; such motions have the frequencies and the duration of weaker earthquakes"

@@ -75,7 +75,7 @@ def simulate(
     model: Annotated[Model, MODELS],
     excitation: Annotated[Waveform | None, WAVEFORMS] = None,
     record: Annotated[
-        File, SHAKING("A recorded motion: CSV, PEER AT2, K-NET, COSMOS or ESM text.", "FILE")
+        File, SHAKING("A recorded motion: CSV, PEER AT2, K-NET, UNAM, COSMOS or ESM text.", "FILE")
     ] = None,
     reading: Annotated[Mapping[str, Any], Reading],
     output: Annotated[

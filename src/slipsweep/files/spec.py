@@ -48,6 +48,7 @@ _RECORD_KEYS = (
     "record",
     "records",
     "pairs",
+    "vertical",
     *(one.name for one in choices.declared(reading.Reading)),
     "polarity",
 )
@@ -307,22 +308,25 @@ def _recorded_motion(
         )
     if {"record", "records"} <= {*table}:
         raise InputError("excitation.records: not allowed beside record: give one of them")
-    if key == "record" and "pairs" in table:
-        raise InputError("excitation.pairs: only beside excitation.records, the files of a suite")
+    for other in ("pairs", "vertical"):
+        if key == "record" and other in table:
+            raise InputError(
+                f"excitation.{other}: only beside excitation.records, the files of a suite"
+            )
     if key == "record" and not isinstance(table["record"], str):
         raise InputError(
             f"excitation.record = {units.show(table['record'])}: must be the name of a file"
         )
     if recorded is not None:
         return recorded
-    given = {
-        name: value for name, value in table.items() if name not in ("record", "records", "pairs")
-    }
+    own = ("record", "records", "pairs", "vertical")
+    given = {name: value for name, value in table.items() if name not in own}
     try:
         how = reading.Reading(**given)
         if key == "record":
             return records.read_record(folder / table["record"], **how.options)
-        return suites.suite_in(folder, table["records"], table.get("pairs"), how)
+        vertical = table.get("vertical", "leave_out")
+        return suites.suite_in(folder, table["records"], table.get("pairs"), how, vertical)
     except InputError as error:
         message = (
             str(error).replace("paths", key, 1) if str(error).startswith("paths") else str(error)

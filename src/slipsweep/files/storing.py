@@ -226,7 +226,7 @@ class Chunks:
         self._files.rm(self._folder, recursive=True)
 
 
-def _region(chunk: Chunk, result: netCDF4.Variable) -> Any:
+def _region(chunk: Chunk, result: "netCDF4.Variable[Any]") -> Any:
     return tuple(chunk.get(dim, slice(None)) for dim in result.dimensions) or ...
 
 

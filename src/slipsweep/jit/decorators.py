@@ -63,4 +63,6 @@ def _uncounted(array: Any) -> Any:
     return numba.carray(_ffi.from_buffer(array), array.shape)
 
 
-uncounted = (lambda array: array) if numba.config.DISABLE_JIT else scalar(_uncounted)
+uncounted: Callable[[Any], Any] = (
+    (lambda array: array) if numba.config.DISABLE_JIT else scalar(_uncounted)
+)

@@ -9,7 +9,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeAlias
 from xml.etree import ElementTree as xml
 
 import numpy as np
@@ -19,7 +19,7 @@ from slipsweep.errors import InputError, RunError
 from slipsweep.model.parameters import check_numbers, number_text, shown
 from slipsweep.model.units import conversion
 from slipsweep.model.variables import HAZARD_RESULTS
-from slipsweep.motion.formats import read_columns, read_lines
+from slipsweep.motion.lines import read_columns, read_lines
 from slipsweep.studies.sampling import Floats, Thresholds
 from slipsweep.studies.suite_statistics import (
     THRESHOLDS,
@@ -31,15 +31,32 @@ from slipsweep.studies.suite_statistics import (
 
 TITLE = "Mean annual rate of exceeding a permanent displacement"
 
-#: Words of a column's name that say what it holds.
-_PGA = {"pga", "acceleration", "amplitude"}
-_RATE = {"rate", "frequency", "exceedance", "afe"}
+Unstated: TypeAlias = Literal["refuse", "accept"]
+
+#: What a heading calls the measure of a curve: peak ground acceleration, another one, or a measure
+#: that may be either.
+_PGA = r"\bpga\b|\bpeak\b.*\bacc|\bzpa\b"
+_SPECTRAL = r"\bp?sa\b|\bsa\s?\(|spectral|response.spectr|\bpg[vd]\b"
+_OTHER_MEASURE = (
+    rf"{_SPECTRAL}|\bs[dv]\b|velocity|displacement|\bmmi\b|\barias\b|\bcav\b|\bia\b"
+    r"|(?<!return )period|\b\d+(?:\.\d+)?\s?(?:s|sec|hz)\b"
+)
+_MEASURE = r"accel|amplitude|ground.?motion|\bi(ml|mt|m)\b|intensity|\blevel"
+
+#: What it calls a rate, whether it says that it is one a year, and what is none.
+_RATE = r"\brate|\bfrequency|exceed|\bm?afe\b|\bmaf\b|\blambda\b|λ"
+_ANNUAL = r"annual|yearly|a year|per (?:year|yr|annum)|/\s?(?:year|yr|a)\b|\bm?afe\b|\bmaf\b"
+_NO_RATE = r"probab|\bpoe\b|\baep\b|\bpe\b|\b\d+(?:\.\d+)?[ -]?(?:years?|yrs?|a)\b|return|period"
 
 #: Spellings of the unit of an annual rate.
-_ANNUAL = {"", "1/yr", "1/year", "1/a", "/yr", "/year", "yr-1", "year-1", "a-1", "per year"}
+_PER_YEAR = {"1/yr", "1/year", "1/a", "/yr", "/year", "yr-1", "year-1", "a-1", "per year"}
 
 #: Columns of OpenQuake's files: the probability of exceeding an acceleration, in g.
-_POE = re.compile(r"poe-(\d.*)")
+_POE = re.compile(r"poe-(\d[\d.eE+-]*)(?::\w+)?")
+
+_ACCEPT = (
+    "--unstated accept takes it for a curve of PGA and annual rates (in Python give a HazardCurve)"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,14 +124,19 @@ class HazardCurve:
         )
 
 
-def read_hazard_curve(path: str | Path, g: float, site: int | None = None) -> HazardCurve:
+def read_hazard_curve(
+    path: str | Path, g: float, site: int | None = None, unstated: Unstated = "refuse"
+) -> HazardCurve:
     """Read a hazard curve of peak ground acceleration from a CSV file; "g" as a unit is `g` m/s², that of the result.
 
     The first line that is not blank and does not begin with ``#`` names the columns: ``PGA (g),
     annual rate``. Columns of other names are left out.  Or a file of OpenQuake, whose probabilities
     of exceedance become annual rates, −ln(1 − p)/T with its investigation time T; `site` is which
-    of its sites, from 1, and needed if it has several. InputError: the file cannot be read, a
-    column is missing or has no unit, or the numbers are no hazard curve.
+    of its sites, from 1, and needed if it has several.
+
+    A file that does not say that its curve is of PGA, or that its rates are annual, is refused, or
+    with `unstated` "accept" taken as such.  InputError: it says otherwise, cannot be read, a column
+    is missing or has no unit, or the numbers are no hazard curve.
     """
     try:
         path = Path(path)
@@ -126,22 +148,33 @@ def read_hazard_curve(path: str | Path, g: float, site: int | None = None) -> Ha
     about = {"hazard_curve_sha256": digest}
     named = next((line for line in lines if line.strip() and not line.startswith("#")), "")
     if _POE.search(named):
-        return _openquake_curve(path, lines, g, site, about)
+        return _openquake_curve(path, lines, g, site, unstated, about)
     if site is not None:
         raise InputError(f"{path}: site = {site}: only for a file of OpenQuake with several sites")
+    comments = _comments(path, lines)
+    has_pga = _says(_PGA, named)
 
     def holds(column: str, words: set[str], unit: str) -> tuple[str, float] | None:
         where = f"{path}: column {shown(column)}"
-        if "probability" in words:
+        if _says(_NO_RATE, column) and not _says(rf"{_PGA}|{_MEASURE}", column):
             raise InputError(
-                f"{where}: must be an annual rate, -ln(1 - p) of an annual probability p"
+                f"{where}: must be an annual rate, -ln(1 - p)/T of a probability p in T years"
             )
-        if words & _RATE:
-            if unit.lower() not in _ANNUAL:
+        if _says(_RATE, column):
+            if unit and unit.lower() not in _PER_YEAR:
                 raise InputError(f"{where}: must be a rate per year, such as annual rate (1/yr)")
+            if not unit and not _says(_ANNUAL, column) and unstated == "refuse":
+                raise InputError(f"{where}: does not say that its rates are annual; {_ACCEPT}")
             return "annual rate", 1.0
-        if not words & _PGA:
+        if _says(_OTHER_MEASURE, column):
+            if has_pga:
+                return None
+            raise InputError(f"{where}: must be of PGA")
+        is_pga = _says(_PGA, column)
+        if not is_pga and (has_pga or not _says(_MEASURE, column)):
             return None
+        if not is_pga and not _says(_PGA, comments) and unstated == "refuse":
+            raise InputError(f"{where}: does not say that it is PGA; {_ACCEPT}")
         if not unit:
             raise InputError(f"{where}: must give its unit in brackets, such as PGA (g)")
         return "PGA", conversion(f"{where}: unit", "m s-2", unit, g)
@@ -150,18 +183,45 @@ def read_hazard_curve(path: str | Path, g: float, site: int | None = None) -> Ha
     return HazardCurve(values["PGA"], values["annual rate"], str(path), about)
 
 
+def _says(pattern: str, text: str) -> bool:
+    """Whether a heading says something; underscores separate words as blanks do."""
+    return bool(re.search(pattern, text.replace("_", " "), re.IGNORECASE))
+
+
+def _comments(path: Path, lines: Sequence[str]) -> str:
+    """The comments of a table (InputError: one says that the curve is another one)."""
+    comments = [line for line in lines if line.startswith("#")]
+    for comment in comments:
+        is_other = _says(_SPECTRAL, comment) and not _says(_PGA, comment)
+        if is_other or (_says(r"exceed|probab", comment) and _says(_NO_RATE, comment)):
+            raise InputError(
+                f"{path}: its comment says {shown(comment.strip(' #'))}: "
+                "must be a curve of PGA and annual rates"
+            )
+    return "\n".join(comments)
+
+
 def _openquake_curve(
-    path: Path, lines: Sequence[str], g: float, site: int | None, about: Mapping[str, str]
+    path: Path,
+    lines: Sequence[str],
+    g: float,
+    site: int | None,
+    unstated: Unstated,
+    about: Mapping[str, str],
 ) -> HazardCurve:
     """One site's curve from a file of OpenQuake: a comment with T and the measure, names, and a row for each site."""
     head = " ".join(line for line in lines if line.startswith("#"))
-    found = re.search(r"investigation_time=([\d.eE+-]+)", head)
+    found = re.search(r"investigation_time\s*=[\s\"']*([\d.eE+-]+)", head)
     if found is None:
         raise InputError(
             f"{path}: no investigation_time in its first line: it is needed for annual rates"
         )
-    measure = re.search(r"imt='?([^',\"]+)", head)
-    if measure is not None and measure[1] != "PGA":
+    measure = re.search(r"\bimt\s*=[\s\"']*([^\s\"',]+)", head)
+    if measure is None and unstated == "refuse":
+        raise InputError(
+            f"{path}: no imt in its first line: does not say that it is PGA; {_ACCEPT}"
+        )
+    if measure is not None and measure[1].upper() != "PGA":
         raise InputError(f"{path}: curves of {measure[1]}: must be of PGA")
     names, *rows = csv.reader(line for line in lines if line.strip() and not line.startswith("#"))
     if not 1 <= (1 if site is None else site) <= len(rows) or (site is None and len(rows) > 1):
