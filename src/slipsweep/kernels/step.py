@@ -364,8 +364,6 @@ def begin_stick_slip(
 ) -> None:
     """t1: begin to slide with b = max(Üy, Eq. 4), with the literal rise b by Eq. 4."""
     eq4 = eq4_of(law, block, ground)
-    if block.velocity == 0.0:
-        eq4 = min(eq4, ground)  # where Eq. 4 falls below Üg they are equal but for rounding
     follows = block.rise == LITERAL or eq4 >= block.yield_acceleration
     block.held = eq4 if follows else block.yield_acceleration
     begin_slide(block, FOLLOWS if follows and rises else HELD, time, growth)
@@ -414,21 +412,23 @@ def wait(law: Law, block: np.record, piece: Piece, now: float, tau: float, end: 
 
     That is where Eq. 4 is below Üg, and `end`, if that is not so at the end, either.
     """
-    at_end = eq4_rate_at_rest(law, block, ground_at(block, piece, end))
+    ground = ground_at(block, piece, tau)
+    if eq4_rate_at_rest(law, block, ground) > 0.0:
+        begin_stick_slip(law, block, True, ground, now + tau, piece.finish - tau)
+        return tau
+    if eq4_rate_at_rest(law, block, ground_at(block, piece, end)) <= 0.0:
+        return end
     low = tau
     high = end
-    if eq4_rate_at_rest(law, block, ground_at(block, piece, tau)) > 0.0:
-        high = tau
-    elif at_end <= 0.0:
-        return end
     while low < 0.5 * (low + high) < high:
         middle = 0.5 * (low + high)
         if eq4_rate_at_rest(law, block, ground_at(block, piece, middle)) > 0.0:
             high = middle
         else:
             low = middle
-    ground = ground_at(block, piece, high)
-    begin_stick_slip(law, block, True, ground, now + high, piece.finish - high)
+    # Eq. 4 is Üg there, but for rounding
+    block.held = ground_at(block, piece, high)
+    begin_slide(block, HELD, now + high, piece.finish - high)
     return high
 
 
@@ -637,8 +637,8 @@ def take_step(
             ends = True
             h = until
     if ends:
-        grows = first_rate < 0.0 if block.phase == UP else first_rate > 0.0
-        if block.velocity == 0.0 and not grows:
+        stays = gained >= 0.0 if block.phase == UP else gained <= 0.0
+        if block.velocity == 0.0 and stays:
             rest(block)  # rounding has made it slide
             return h, math.nan
         h = step_to_end_of_phase(law, block, piece, rises, tau, h, first_rate)
