@@ -93,10 +93,6 @@ def run(
     from slipsweep.jit import compiling
 
     checked = spec.load(sweep)
-    if solver is not None and checked.recorded is not None:
-        raise InputError(
-            f"--solver {solver}: not allowed with recorded motions, to which the response is exact"
-        )
     if (
         solver is not None and solver != checked.solver.name
     ):  # the same one keeps the options of the sweep file

@@ -302,7 +302,7 @@ def _recorded_motion(
     """The records in files that [excitation] names, or those that a result has kept."""
     table = tables["excitation"]
     others = [f"excitation.{one}" for one in table if one not in _RECORD_KEYS]
-    for other in (*others, *(f"solver.{one}" for one in tables["solver"])):
+    for other in others:
         raise InputError(
             f"{other}: not allowed with excitation.{key}, to which the response is exact"
         )

@@ -11,7 +11,7 @@ import xarray as xr
 from slipsweep.errors import InputError
 from slipsweep.model import parameters
 from slipsweep.model import variables as known
-from slipsweep.model.options import MODELS, SOLVERS, Cycle, Model, Newmark, Solver
+from slipsweep.model.options import MODELS, SOLVERS, Model, Newmark, Solver
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform, peak_acceleration
@@ -29,12 +29,7 @@ class Problem:
 def check_problem(excitation: Any, model: Any, solver: Any) -> Problem:
     """What is to be solved, and how; each is an object, or the name of one with its defaults."""
     motion = excitation if isinstance(excitation, (Record, Suite)) else WAVEFORMS.of(excitation)
-    chosen = SOLVERS.of(solver)
-    if isinstance(motion, (Record, Suite)) and not isinstance(chosen, Cycle):
-        raise InputError(
-            f"solver = {chosen}: not allowed with a {type(motion).__name__}, to which Cycle() is exact"
-        )
-    return Problem(MODELS.of(model), motion, chosen)
+    return Problem(MODELS.of(model), motion, SOLVERS.of(solver))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -294,6 +294,7 @@ def _about(problem: grid_inputs.Problem, given: Collection[str]) -> dict[str, An
     """What results say of themselves: the choices read back from it are those of the problem."""
     motion = problem.excitation
     title = "Response of a rigid block to a recorded motion"
+    shaking: dict[str, Any]
     if isinstance(motion, Record):
         shaking = {"record": motion.name, **motion.attrs}
     elif isinstance(motion, Suite):
@@ -301,7 +302,7 @@ def _about(problem: grid_inputs.Problem, given: Collection[str]) -> dict[str, An
         shaking = {**motion.attrs}
     else:
         title = "Permanent displacement of a rigid block, swept"
-        shaking = WAVEFORMS.attributes(motion) | options.SOLVERS.attributes(problem.solver)
+        shaking = WAVEFORMS.attributes(motion)
     inputs = {"friction_inputs": options.friction_inputs(problem.model.name, given, {})}
     return {
         "title": title,
@@ -309,4 +310,5 @@ def _about(problem: grid_inputs.Problem, given: Collection[str]) -> dict[str, An
         **options.MODELS.attributes(problem.model),
         **inputs,
         **shaking,
+        **options.SOLVERS.attributes(problem.solver),
     }

@@ -85,7 +85,11 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
             results[:, left] = found
 
     if isinstance(problem.solver, Step):
-        return step_solver(problem, options, polarity)
+        stepper = stepper_of(problem, options, polarity)
+        no_history = step.history_of(np.empty(0), np.empty(0))
+        return Solver(
+            lambda cells, results: stepper(cells, no_history, results), ROWS, step.STEP_CELL
+        )
     if isinstance(motion, Record):
         wave = cutting.wave_of_record(motion, polarity)
         return Solver(
@@ -96,25 +100,26 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
     return Solver(under_sine if is_plain_sine(motion) else under_wave, ROWS)
 
 
-def step_solver(problem: Problem, options: physics.Options, polarity: float) -> Solver:
-    """What solves cells by steps."""
+def stepper_of(
+    problem: Problem, options: physics.Options, polarity: float
+) -> Callable[[np.ndarray, step.History, np.ndarray], Any]:
+    """What solves cells by steps: cells, of dtype `step.STEP_CELL`, a history and results."""
     assert isinstance(problem.solver, Step)
     rule = RULES[problem.solver.rule]
     count = problem.solver.steps_per_cycle
+    on_piece = 0
     if isinstance(problem.excitation, Record):
-        wave = cutting.wave_of_record(problem.excitation, polarity)
+        path = cutting.path_of_record(problem.excitation, polarity)
         on_piece = math.ceil(count / STEPS_PER_SAMPLE)
     else:
-        wave = cutting.wave_of(problem.excitation)
-        on_piece = 0
-    steps = step.steps_of(wave, rule, count, on_piece)
-    no_history = step.history_of(np.empty(0), np.empty(0))
+        path = cutting.path_of_waveform(problem.excitation)
+    steps = step.steps_of(path, rule, count, on_piece)
 
-    def solve(cells: np.ndarray, results: np.ndarray) -> None:
+    def solve(cells: np.ndarray, history: step.History, results: np.ndarray) -> None:
         blocks = step.blocks_of(rule, count, on_piece)
-        step.solve_steps(cells, options, wave, blocks, steps, no_history, results)
+        step.solve_steps(cells, options, path, blocks, steps, history, results)
 
-    return Solver(solve, ROWS, step.STEP_CELL)
+    return solve
 
 
 def is_plain_sine(motion: Any) -> bool:
@@ -125,13 +130,14 @@ def is_plain_sine(motion: Any) -> bool:
 def cost_of(problem: Problem) -> int:
     """What a cell takes, about, in those of a plain sine by the cycle solver."""
     motion = problem.excitation
+    steps = problem.solver.steps_per_cycle if isinstance(problem.solver, Step) else 0
     if isinstance(motion, Waveform):
-        if isinstance(problem.solver, Step):
-            return 1 + problem.solver.steps_per_cycle // 16
+        if steps:
+            return 1 + steps // 16
         return 1 if is_plain_sine(motion) else 16
-    return max(
-        64, max(one.times.size for one in (motion if isinstance(motion, Suite) else (motion,))) // 8
-    )
+    records = motion if isinstance(motion, Suite) else (motion,)
+    samples = max(record.times.size for record in records)
+    return max(64, samples // 8) * math.ceil(max(steps, 1) / STEPS_PER_SAMPLE)
 
 
 def memory_of(problem: Problem) -> int:

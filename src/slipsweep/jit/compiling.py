@@ -92,13 +92,7 @@ def _compiled_in(folder: Path | None, function: Callable[..., Any], types: tuple
     numba.config.CACHE_DIR = str(folder)
     try:
         # with its types it is compiled at once, and for no others
-        compiled = part(
-            "arcp",
-            no_cpython_wrapper=False,
-            no_cfunc_wrapper=True,
-            cache=folder is not None,
-            signature_or_function=[types],
-        )(function)
+        compiled = part("arcp", cache=folder is not None, signature_or_function=[types])(function)
     finally:
         numba.config.CACHE_DIR = given
     if not kept:
@@ -134,5 +128,6 @@ def _digest_of_sources() -> str:
     sources = [
         path for room in ("model", "jit", "kernels") for path in (package / room).rglob("*.py")
     ]
-    contents = (path.read_bytes() for path in sorted([*sources, package / "motion" / "pieces.py"]))
+    sources += [package / "motion" / name for name in ("pieces.py", "paths.py")]
+    contents = (path.read_bytes() for path in sorted(sources))
     return hashlib.sha256(b"".join(contents)).hexdigest()[:16]

@@ -20,23 +20,27 @@ def part(*fastmath: str, **options: Any) -> Callable[[_Function], _Function]:
         "error_model": "numpy",
         "fastmath": {"contract", *fastmath},
         "forceinline": False,
-        "no_cpython_wrapper": True,
-        "no_cfunc_wrapper": True,
     }
     decorate: Callable[[_Function], _Function] = numba.njit(**(own | options))
     return decorate
 
 
-#: `contract` lets the compiler fuse a*b + c, `arcp` divide by g once.  Not `reassoc`: sums whose
-#: order the compiler chooses have other last bits in the process that compiles than in those that
-#: load the kernel.
-scalar = part("arcp")
+#: Options of functions that only kernels call, which takes a quarter of the time to compile them:
+#: Python cannot call them.  They allocate nothing, and count no references to arrays: those are
+#: arguments of a kernel, which outlive it.
+_INTERNAL = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+#: A function that only kernels call.  `contract` lets the compiler fuse a*b + c, `arcp` divide by g
+#: once.  Not `reassoc`: sums whose order the compiler chooses have other last bits in the process
+#: that compiles than in those that load the kernel.
+scalar = part("arcp", **_INTERNAL)
 
 #: The same for what stands in loops over cells: LLVM vectorises a loop only if everything in it is
-#: inlined, which it does not do by itself with functions as long as these.  And for what takes a
-#: state or a wave at each part of a walk: their fields are arguments one by one, which takes as
-#: long as the step.
-inlined = part("arcp", forceinline=True)
+#: inlined, which it does not do by itself with functions as long as these.
+inlined = part("arcp", forceinline=True, **_INTERNAL)
+
+#: The same for an equation, which Python calls, too.
+equation = part("arcp", forceinline=True)
 
 #: The same for a function with one caller and many callees, which numba would otherwise optimise
 #: once more.

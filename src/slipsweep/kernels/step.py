@@ -29,7 +29,7 @@ from slipsweep.kernels.block import (
     Options,
 )
 from slipsweep.model import equations as eq
-from slipsweep.motion.pieces import Piece, Wave
+from slipsweep.motion.paths import TERMS, Curve, Path, Piece
 
 #: Rules by which steps are taken; their errors are of the orders 1, 2 and 4.
 RECTANGLE = 0
@@ -116,10 +116,12 @@ BLOCK = np.dtype(
 
 
 class History(NamedTuple):
-    """Samples of the motion, each (samples,): when, Ü, V and W; the first `done[0]` are filled in."""
+    """Samples of the motion, each (samples,); of the first `done[0]` Ü, V and W are filled in."""
 
     phases: np.ndarray
+    ground_acceleration: np.ndarray
     block_acceleration: np.ndarray
+    friction_coefficient: np.ndarray
     velocity: np.ndarray
     displacement: np.ndarray
     done: np.ndarray
@@ -138,6 +140,10 @@ class Steps(NamedTuple):
 GROWTH_SHARE = 64.0
 TIME_SHARE = 16.0
 SHORTEST_STEP = 1e-14
+
+#: Accelerations that differ by no more are equal: as parts of Üg and of g.
+ROUNDING = 1e-12
+LEAST_ROUNDING = 4e-16
 
 #: Points of a rise at which Eq. 4 is compared with Üy (`yield_governs`).
 POINTS_OF_RISE = 32
@@ -260,15 +266,16 @@ def excess(
         return -1.0
     if slide.phase == UP:
         return velocity
+    rounding = ROUNDING * abs(ground[2]) + LEAST_ROUNDING * slide.g  # of Eq. 4
     if rises and slide.phase == HELD:
         eq4 = ground[2] - eq4_rate(law, slide, ground[2], velocity)
-        return max(-velocity, eq4 - slide.held)
+        return max(-velocity, eq4 - slide.held - rounding)
     if rises and slide.phase == FOLLOWS and monotone:
         first = ground[0] - rates[0]
         middle = ground[1] - rates[1]
         last = ground[2] - rates[2]
         # how a parabola through the three falls at the end
-        return max(-velocity, 4.0 * middle - 3.0 * last - first)
+        return max(-velocity, 4.0 * middle - 3.0 * last - first - rounding)
     return -velocity
 
 
@@ -287,28 +294,30 @@ def turning_point(
 
 
 @inlined
-def ground_at(block: np.record, piece: Piece, tau: float) -> float:
+def ground_at(block: np.record, piece: Piece, curve: Curve, tau: float) -> float:
     """Üg at τ on a piece, with the sign of the piece also where it is 0."""
-    total = 0.0
-    for k in range(piece.degree - 1, -1, -1):
-        total = (total + piece.coefficients[k]) * tau
+    total = piece.slope * tau
+    if piece.degree > 1:
+        total = 0.0
+        for k in range(piece.degree - 1, -1, -1):
+            total = (total + curve.coefficients[k]) * tau
     return math.copysign(block.amplitude * (piece.top + total), piece.top)
 
 
 @scalar
 def ground_in_step(
-    block: np.record, piece: Piece, tau: float, h: float
+    block: np.record, piece: Piece, curve: Curve, tau: float, h: float
 ) -> tuple[float, float, float]:
     """Üg at the start, the middle and the end of a step; in the middle a mean, if that will do."""
-    start = ground_at(block, piece, tau)
-    end = ground_at(block, piece, tau + h)
+    start = ground_at(block, piece, curve, tau)
+    end = ground_at(block, piece, curve, tau + h)
     if block.rule == SIMPSON:
-        return start, ground_at(block, piece, tau + 0.5 * h), end
+        return start, ground_at(block, piece, curve, tau + 0.5 * h), end
     return start, 0.5 * (start + end), end
 
 
 @scalar
-def place_of(block: np.record, piece: Piece, level: float) -> float:
+def place_of(block: np.record, piece: Piece, curve: Curve, level: float) -> float:
     """Return τ at which |Üg| reaches a level on a piece on which it grows (the end, if it does not)."""
     if block.amplitude * abs(piece.first) >= level:
         return piece.begin
@@ -316,7 +325,7 @@ def place_of(block: np.record, piece: Piece, level: float) -> float:
     high = piece.finish
     while low < 0.5 * (low + high) < high:
         middle = 0.5 * (low + high)
-        if abs(ground_at(block, piece, middle)) >= level:
+        if abs(ground_at(block, piece, curve, middle)) >= level:
             high = middle
         else:
             low = middle
@@ -325,10 +334,10 @@ def place_of(block: np.record, piece: Piece, level: float) -> float:
 
 @scalar
 def advance_from(
-    law: Law, block: np.record, piece: Piece, tau: float, h: float, first_rate: float
+    law: Law, block: np.record, piece: Piece, curve: Curve, tau: float, h: float, first_rate: float
 ) -> tuple[tuple[float, float, float], float, float, float, float]:
     """Take a step from τ: return Üg in it, and what `advance` returns."""
-    ground = ground_in_step(block, piece, tau, h)
+    ground = ground_in_step(block, piece, curve, tau, h)
     gained, moved, middle_rate, last_rate = advance(
         law, slide_of(block), block.rule, ground, h, block.velocity, first_rate
     )
@@ -392,42 +401,44 @@ def end_phase(block: np.record, eq4: float) -> None:
 
 
 @scalar
-def wait_for_newmark(block: np.record, piece: Piece, now: float, tau: float) -> float:
+def wait_for_newmark(block: np.record, piece: Piece, curve: Curve, now: float, tau: float) -> float:
     """Return τ at which Newmark's block at rest begins to slide: where Üg exceeds what it resists."""
     down = piece.top > 0.0
     limit = block.yield_acceleration if down else block.upslope_yield_acceleration
     if block.amplitude * abs(piece.top) <= limit:
         return piece.finish
     if abs(piece.last) > abs(piece.first):
-        tau = max(tau, place_of(block, piece, limit))
-    elif abs(ground_at(block, piece, tau)) <= limit:
+        tau = max(tau, place_of(block, piece, curve, limit))
+    elif abs(ground_at(block, piece, curve, tau)) <= limit:
         return piece.finish
     begin_slide(block, DOWN if down else UP, now + tau, piece.finish - tau)
     return tau
 
 
 @scalar
-def wait(law: Law, block: np.record, piece: Piece, now: float, tau: float, end: float) -> float:
+def wait(
+    law: Law, block: np.record, piece: Piece, curve: Curve, now: float, tau: float, end: float
+) -> float:
     """Return τ at which the paper's block begins to slide while Üg rises beyond Üy: t1.
 
     That is where Eq. 4 is below Üg, and `end`, if that is not so at the end, either.
     """
-    ground = ground_at(block, piece, tau)
+    ground = ground_at(block, piece, curve, tau)
     if eq4_rate_at_rest(law, block, ground) > 0.0:
         begin_stick_slip(law, block, True, ground, now + tau, piece.finish - tau)
         return tau
-    if eq4_rate_at_rest(law, block, ground_at(block, piece, end)) <= 0.0:
+    if eq4_rate_at_rest(law, block, ground_at(block, piece, curve, end)) <= 0.0:
         return end
     low = tau
     high = end
     while low < 0.5 * (low + high) < high:
         middle = 0.5 * (low + high)
-        if eq4_rate_at_rest(law, block, ground_at(block, piece, middle)) > 0.0:
+        if eq4_rate_at_rest(law, block, ground_at(block, piece, curve, middle)) > 0.0:
             high = middle
         else:
             low = middle
     # Eq. 4 is Üg there, but for rounding
-    block.held = ground_at(block, piece, high)
+    block.held = ground_at(block, piece, curve, high)
     begin_slide(block, HELD, now + high, piece.finish - high)
     return high
 
@@ -436,14 +447,13 @@ def wait(law: Law, block: np.record, piece: Piece, now: float, tau: float, end: 
 
 
 @scalar
-def sample_rest(block: np.record, until: float, history: History) -> int:
-    """Fill in the samples before a time, up to which the block rests; return the next sample."""
+def sample_rest(block: np.record, until: float, history: History) -> None:
+    """Fill in the samples before a time, up to which the block rests."""
     at = history.done[0]
     while at < history.phases.size and history.phases[at] < until:
         history.displacement[at] = block.displacement
         at += 1
     history.done[0] = at
-    return at
 
 
 @scalar
@@ -451,6 +461,7 @@ def sample_step(
     law: Law,
     block: np.record,
     piece: Piece,
+    curve: Curve,
     now: float,
     tau: float,
     h: float,
@@ -458,10 +469,14 @@ def sample_step(
     history: History,
 ) -> None:
     """Fill in the samples within a step from τ."""
-    at = sample_rest(block, now + tau, history)
+    if block.velocity == 0.0:
+        sample_rest(block, now + tau, history)
+    at = history.done[0]
     while at < history.phases.size and history.phases[at] < now + tau + h:
-        part = history.phases[at] - (now + tau)
-        ground, gained, moved, _, last_rate = advance_from(law, block, piece, tau, part, first_rate)
+        part = max(history.phases[at] - (now + tau), 0.0)  # between two steps is rounding
+        ground, gained, moved, _, last_rate = advance_from(
+            law, block, piece, curve, tau, part, first_rate
+        )
         history.block_acceleration[at] = ground[2] - last_rate
         history.velocity[at] = block.velocity + gained
         history.displacement[at] = block.displacement + moved
@@ -475,9 +490,9 @@ def attenuate(block: np.record, time: float, duration: float, history: History) 
     side = math.copysign(1.0, block.velocity)
     speed = abs(block.velocity)
     until = time + min(speed / block.held, duration)
-    at = sample_rest(block, time, history)
+    at = history.done[0]
     while at < history.phases.size and history.phases[at] < until:
-        h = history.phases[at] - time
+        h = max(history.phases[at] - time, 0.0)
         moved = side * eq.attenuated_displacement(speed, block.held, h)
         history.block_acceleration[at] += side * block.held
         history.velocity[at] = side * eq.attenuated_velocity(speed, block.held, h)
@@ -498,13 +513,16 @@ def excess_after(
     law: Law,
     block: np.record,
     piece: Piece,
+    curve: Curve,
     rises: bool,
     tau: float,
     h: float,
     first_rate: float,
 ) -> float:
     """Return `excess` after a step from τ."""
-    ground, gained, _, middle_rate, last_rate = advance_from(law, block, piece, tau, h, first_rate)
+    ground, gained, _, middle_rate, last_rate = advance_from(
+        law, block, piece, curve, tau, h, first_rate
+    )
     rates = (first_rate, middle_rate, last_rate)
     return excess(
         law, slide_of(block), block.rise == MONOTONE, rises, ground, rates, block.velocity + gained
@@ -516,6 +534,7 @@ def step_to_end_of_phase(
     law: Law,
     block: np.record,
     piece: Piece,
+    curve: Curve,
     rises: bool,
     tau: float,
     h: float,
@@ -528,13 +547,17 @@ def step_to_end_of_phase(
     nearest = 1e-14 * h
     low = 0.0
     high = h
-    below = min(excess_after(law, block, piece, rises, tau, low, first_rate), -1e-300)
-    above = excess_after(law, block, piece, rises, tau, high, first_rate)
+    below = min(excess_after(law, block, piece, curve, rises, tau, low, first_rate), -1e-300)
+    above = excess_after(law, block, piece, curve, rises, tau, high, first_rate)
     side = 0
+    tries = 0
     while high - low > 2.0 * nearest:
-        new = high - above * ((high - low) / (above - below))
-        new = min(max(new, low + nearest), high - nearest)
-        value = excess_after(law, block, piece, rises, tau, new, first_rate)
+        tries += 1
+        new = 0.5 * (low + high)
+        if tries < 20:
+            new = high - above * ((high - low) / (above - below))
+            new = min(max(new, low + nearest), high - nearest)
+        value = excess_after(law, block, piece, curve, rises, tau, new, first_rate)
         if value > 0.0:
             high = new
             above = value
@@ -601,6 +624,7 @@ def take_step(
     law: Law,
     block: np.record,
     piece: Piece,
+    curve: Curve,
     rises: bool,
     now: float,
     tau: float,
@@ -613,7 +637,7 @@ def take_step(
     The rate is NaN where another phase follows.
     """
     ground, gained, moved, middle_rate, last_rate = advance_from(
-        law, block, piece, tau, h, first_rate
+        law, block, piece, curve, tau, h, first_rate
     )
     rates = (first_rate, middle_rate, last_rate)
     ends = (
@@ -641,11 +665,13 @@ def take_step(
         if block.velocity == 0.0 and stays:
             rest(block)  # rounding has made it slide
             return h, math.nan
-        h = step_to_end_of_phase(law, block, piece, rises, tau, h, first_rate)
-        ground, gained, moved, _, last_rate = advance_from(law, block, piece, tau, h, first_rate)
+        h = step_to_end_of_phase(law, block, piece, curve, rises, tau, h, first_rate)
+        ground, gained, moved, _, last_rate = advance_from(
+            law, block, piece, curve, tau, h, first_rate
+        )
         turning = block.velocity
     if history.phases.size > 0:
-        sample_step(law, block, piece, now, tau, h, first_rate, history)
+        sample_step(law, block, piece, curve, now, tau, h, first_rate, history)
     block.velocity += gained
     block.displacement += moved
     block.largest_velocity = max(block.largest_velocity, block.velocity, turning)
@@ -663,6 +689,7 @@ def step_along(
     law: Law,
     block: np.record,
     piece: Piece,
+    curve: Curve,
     rises: bool,
     now: float,
     tau: float,
@@ -686,18 +713,23 @@ def step_along(
         if block.phase == STUCK:
             first_rate = math.nan
             if block.rise == NEWMARK:
-                tau = wait_for_newmark(block, piece, now, tau)
-            elif rises and ground_at(block, piece, finish) >= block.yield_acceleration:
-                if ground_at(block, piece, tau) < block.yield_acceleration:
-                    tau = place_of(block, piece, block.yield_acceleration)
-                tau = wait(law, block, piece, now, tau, max(tau, end))
+                tau = wait_for_newmark(block, piece, curve, now, tau)
+            elif rises and ground_at(block, piece, curve, finish) >= block.yield_acceleration:
+                if ground_at(block, piece, curve, tau) < block.yield_acceleration:
+                    tau = place_of(block, piece, curve, block.yield_acceleration)
+                tau = wait(law, block, piece, curve, now, tau, max(tau, end))
             else:
                 return
             continue
         since = now + tau - block.onset
         longest = max(GROWTH_SHARE * block.growth, TIME_SHARE * since) / block.steps
         if math.isnan(first_rate):
-            first_rate = rate(law, slide_of(block), ground_at(block, piece, tau), block.velocity)
+            first_rate = rate(
+                law, slide_of(block), ground_at(block, piece, curve, tau), block.velocity
+            )
+            if block.velocity == 0.0 and block.phase != CONTINUOUS:
+                # a slide that begins is not stopped by rounding
+                first_rate = min(first_rate, 0.0) if block.phase == UP else max(first_rate, 0.0)
         if tau == begin and longest >= whole and j < last and history.phases.size == 0:
             taken, first_rate = take_whole_steps(
                 law, block, rises, whole, points[each * j :], last - j, first_rate
@@ -707,7 +739,9 @@ def step_along(
                 tau = piece.finish if j == count else piece.begin + j * whole
                 continue
         h = min(max(longest, SHORTEST_STEP), end - tau)
-        h_taken, first_rate = take_step(law, block, piece, rises, now, tau, h, first_rate, history)
+        h_taken, first_rate = take_step(
+            law, block, piece, curve, rises, now, tau, h, first_rate, history
+        )
         tau = end if h_taken >= end - tau else tau + h_taken
 
 
@@ -749,12 +783,12 @@ def yield_governs(law: Law, block: np.record, low: float, high: float) -> bool:
 
 
 @scalar
-def yield_governs_wave(law: Law, block: np.record, wave: Wave) -> bool:
+def yield_governs_wave(law: Law, block: np.record, path: Path) -> bool:
     """Return whether Eq. 4 stays at or below Üy on all rises, and wherever Üg jumps to."""
     if block.mode != eq.STICK_SLIP or block.rise != MONOTONE:
         return False
-    for p in range(wave.pieces.shape[0]):
-        piece = wave.pieces[p]
+    for p in range(path.base.pieces.size):
+        piece = path.base.pieces[p]
         if piece.top > 0.0 and (piece.last >= piece.first or piece.jumps):
             low = block.amplitude * piece.first
             high = max(low, block.amplitude * piece.last) if piece.last >= piece.first else low
@@ -829,23 +863,24 @@ def walk(
     block: np.record,
     cell: np.record,
     options: Options,
-    wave: Wave,
+    path: Path,
     cycle: int,
     offset: float,
     steps: Steps,
     history: History,
 ) -> None:
-    """Go through the pieces of a cycle of the wave, whose times are `offset` later."""
+    """Go through the pieces of a cycle of the path, whose times are `offset` later."""
     is_record = block.steps_on_piece > 0
     k = 0  # the positive half wave that a piece lies in, or that comes next
-    for p in range(wave.cycle[cycle], wave.cycle[cycle + 1]):
-        while k < wave.height.size and wave.interval[k, 1] <= p:
+    for p in range(path.cycles[cycle].first, path.cycles[cycle + 1].first):
+        while k < path.intervals.size and path.intervals[k].end <= p:
             k += 1
-        peak = block.amplitude * wave.height[k] if k < wave.height.size else 0.0
+        peak = block.amplitude * path.intervals[k].height if k < path.intervals.size else 0.0
         is_pulse = peak > block.yield_acceleration
-        piece = wave.pieces[p]
+        piece = path.base.pieces[p]
+        curve = path.base.curves[piece.curve]
         rises = piece.top > 0.0 and piece.first <= piece.last
-        starts = k < wave.height.size and wave.interval[k, 0] == p
+        starts = k < path.intervals.size and path.intervals[k].first == p
         if block.in_pulse and (starts or piece.top <= 0.0):
             end_positive_half_wave(block)
         ended = piece.top == 0.0 or (starts and not is_pulse)
@@ -857,7 +892,9 @@ def walk(
         highest = block.amplitude * max(piece.first, piece.last)
         comes = piece.top > 0.0 and is_pulse and not block.in_pulse
         if comes and highest >= block.yield_acceleration:
-            reaches = place_of(block, piece, block.yield_acceleration) if rises else piece.begin
+            reaches = (
+                place_of(block, piece, curve, block.yield_acceleration) if rises else piece.begin
+            )
         now = offset + piece.start - piece.begin
         tau = piece.begin
         for until in (min(reaches, piece.finish), piece.finish):
@@ -867,7 +904,7 @@ def walk(
                     attenuate(block, now + tau, until - tau, history)
                 else:
                     points = steps.wave[steps.first[p] : steps.first[p + 1]]
-                    step_along(law, block, piece, rises, now, tau, until, points, history)
+                    step_along(law, block, piece, curve, rises, now, tau, until, points, history)
             if until == reaches and not block.in_pulse:
                 if is_record:
                     set_friction_of_pulse(law, block, cell, options, peak)
@@ -953,17 +990,17 @@ def walk_all(
     block: np.record,
     cell: np.record,
     options: Options,
-    wave: Wave,
+    path: Path,
     steps: Steps,
     history: History,
 ) -> None:
     """Go through all cycles; those that gain what the last one did are not walked again."""
     walked = Cycle(-1, -1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False)
     n = 0
-    for c in range(wave.shape.size):
-        left = wave.repeats if wave.repeats > 0 and c == wave.lead else 1
+    for c in range(path.cycles.size - 1):
+        left = path.repeats if path.repeats > 0 and c == path.lead else 1
         while left > 0 and block.validity & NO_VALUE == 0:
-            if walked.shape == wave.shape[c] and history.phases.size == 0:
+            if walked.shape == path.cycles[c].shape and history.phases.size == 0:
                 count = repetitions(block, walked, left)
                 if count > 0:
                     repeat(block, walked, count)
@@ -982,9 +1019,9 @@ def walk_all(
             block.largest_displacement = displacement
             block.smallest_displacement = displacement
             offset = 2.0 * math.pi * (n - c)
-            walk(law, block, cell, options, wave, c, offset, steps, history)
+            walk(law, block, cell, options, path, c, offset, steps, history)
             walked = Cycle(
-                wave.shape[c],
+                path.cycles[c].shape,
                 phase,
                 held,
                 velocity,
@@ -1006,17 +1043,17 @@ def walk_all(
 
 
 @scalar
-def validity_before(block: np.record, cell: np.record, options: Options, wave: Wave) -> int:
+def validity_before(block: np.record, cell: np.record, options: Options, path: Path) -> int:
     """Set friction and mode for the peak of the shaking; return the flags known before the motion."""
     if block.steps_on_piece == 0:
         interface = set_friction(block, cell, options, block.amplitude)
-        if block.amplitude * wave.highest > block.yield_acceleration:
+        if block.amplitude * path.highest > block.yield_acceleration:
             return interface.validity
         # ramps keep the shaking below Üy
         return interface.validity & ~(flags.NEAR_MODE_LIMIT | flags.FRICTION_ESTIMATED)
-    peak = block.amplitude * max(wave.highest, -wave.lowest)
+    peak = block.amplitude * max(path.highest, -path.lowest)
     interface = set_friction(block, cell, options, peak)
-    lowest = eq.normal_acceleration(block.amplitude * wave.lowest, block.tan_theta, block.g)
+    lowest = eq.normal_acceleration(block.amplitude * path.lowest, block.tan_theta, block.g)
     uplift = flags.UPLIFT if lowest <= 0.0 and options.rise != NEWMARK else 0
     return uplift | interface.validity & (flags.STATICALLY_UNSTABLE | flags.LIMIT_UNDEFINED)
 
@@ -1027,7 +1064,7 @@ def solve_cell(
     block: np.record,
     cell: np.record,
     options: Options,
-    wave: Wave,
+    path: Path,
     steps: Steps,
     history: History,
 ) -> Motion:
@@ -1051,17 +1088,25 @@ def solve_cell(
     block.slips = 0.0
     block.stick_slip_pulses = 0.0
     block.continuous_pulses = 0.0
-    block.validity = validity_before(block, cell, options, wave)
+    block.validity = validity_before(block, cell, options, path)
     is_record = block.steps_on_piece > 0
     mode = block.mode
-    peak = block.amplitude * (max(wave.highest, -wave.lowest) if is_record else 1.0)
-    if block.validity & NO_VALUE == 0 and block.amplitude * wave.highest > block.yield_acceleration:
-        if not is_record and yield_governs_wave(law, block, wave):
+    peak = block.amplitude * (max(path.highest, -path.lowest) if is_record else 1.0)
+    if block.validity & NO_VALUE == 0 and block.amplitude * path.highest > block.yield_acceleration:
+        if not is_record and yield_governs_wave(law, block, path):
             block.validity = flags.without_estimates(block.validity | flags.YIELD_GOVERNS)
-        walk_all(law, block, cell, options, wave, steps, history)
-        end = wave.pieces[wave.pieces.shape[0] - 1].end
-        run_out(block, end + 2.0 * math.pi * max(wave.repeats - 1, 0), history)
+        walk_all(law, block, cell, options, path, steps, history)
+        end = path.base.pieces[path.base.pieces.size - 1].end
+        run_out(block, end + 2.0 * math.pi * max(path.repeats - 1, 0), history)
     sample_rest(block, math.inf, history)
+    for at in range(history.phases.size):
+        history.friction_coefficient[at] = eq.mobilised_friction(  # Eq. 1
+            history.ground_acceleration[at],
+            history.block_acceleration[at],
+            block.mu_s,
+            block.tan_theta,
+            block.g,
+        )
     validity = flags.settled(block.validity, block.displacement, peak)
     if validity & NO_VALUE:
         return Motion(math.nan, math.nan, -1.0, float(validity), -1.0, -1.0, -1.0)
@@ -1081,7 +1126,7 @@ def solve_cells(
     law: Law,
     cells: np.ndarray,
     options: Options,
-    wave: Wave,
+    path: Path,
     blocks: np.ndarray,
     steps: Steps,
     history: History,
@@ -1089,13 +1134,13 @@ def solve_cells(
 ) -> None:
     """Step the cells of a tile with a friction law, as `solve_steps` does with that of the paper."""
     for j in range(cells.size):
-        motion = solve_cell(law, blocks[0], cells[j], options, wave, steps, history)
+        motion = solve_cell(law, blocks[0], cells[j], options, path, steps, history)
         flags.store(motion, j, results)
 
 
-def steps_of(wave: Wave, rule: int, steps: int, steps_on_piece: int) -> Steps:
+def steps_of(path: Path, rule: int, steps: int, steps_on_piece: int) -> Steps:
     """Return the base's motion at the points of all steps: so many in 2π, or on a piece."""
-    pieces = wave.pieces
+    pieces = path.base.pieces
     length = pieces["finish"] - pieces["begin"]
     each = 2 if rule == SIMPSON else 1
     count = np.full(length.size, steps_on_piece)
@@ -1107,9 +1152,13 @@ def steps_of(wave: Wave, rule: int, steps: int, steps_on_piece: int) -> Steps:
     number = np.arange(first[-1]) - np.repeat(first[:-1], sizes)
     number -= np.repeat(np.where(pieces["begin"] == 0.0, 0, sizes - 1), sizes)
     tau = number * np.repeat(length / (each * count), sizes)
-    total = np.zeros(tau.size)
-    for coefficient in pieces["coefficients"].T[::-1]:
-        total = (total + np.repeat(coefficient, sizes)) * tau
+    total = np.repeat(pieces["slope"], sizes) * tau
+    curved = np.flatnonzero(np.repeat(pieces["degree"] > 1, sizes))
+    curve = np.repeat(pieces["curve"], sizes)[curved]
+    total[curved] = 0.0
+    for power in range(TERMS - 1, -1, -1):
+        coefficient = path.base.curves["coefficients"][curve, power]
+        total[curved] = (total[curved] + coefficient) * tau[curved]
     top = np.repeat(pieces["top"], sizes)
     return Steps(np.copysign(top + total, top), first)
 
@@ -1127,7 +1176,9 @@ def history_of(phases: np.ndarray, ground_acceleration: np.ndarray) -> History:
     """Return a history to be filled in at increasing phases, of a block that rests so far."""
     return History(
         phases,
+        ground_acceleration,
         ground_acceleration.copy(),
+        np.zeros(phases.size),
         np.zeros(phases.size),
         np.zeros(phases.size),
         np.zeros(1, np.int64),
@@ -1138,7 +1189,7 @@ def history_of(phases: np.ndarray, ground_acceleration: np.ndarray) -> History:
 def solve_steps(
     cells: np.ndarray,
     options: Options,
-    wave: Wave,
+    path: Path,
     blocks: np.ndarray,
     steps: Steps,
     history: History,
@@ -1150,4 +1201,4 @@ def solve_steps(
     of `Motion`, cells).
     """
     law = Law(exponential_friction, False)
-    solve_cells(law, cells, options, wave, blocks, steps, history, results)
+    solve_cells(law, cells, options, path, blocks, steps, history, results)
