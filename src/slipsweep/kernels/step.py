@@ -451,6 +451,7 @@ def sample_rest(block: np.record, until: float, history: History) -> None:
     """Fill in the samples before a time, up to which the block rests."""
     at = history.done[0]
     while at < history.phases.size and history.phases[at] < until:
+        history.velocity[at] = block.velocity  # of continuous sliding after the shaking
         history.displacement[at] = block.displacement
         at += 1
     history.done[0] = at
