@@ -243,5 +243,6 @@ def test_families_have_their_unit_and_newmarks_curves_their_dash(grid: xr.Datase
         np.testing.assert_allclose(
             other.get_ydata(), 1000.0 * direct.where(direct > 0.0), rtol=1e-12
         )
-        assert other._dash_pattern[1] is None or other.get_linestyle() == line.get_linestyle()
+        assert other.is_dashed() == line.is_dashed()
+    assert [line.is_dashed() for line in theirs] == [False, True]
     assert "Newmark's block (same dash)" in legend(figure)
