@@ -52,6 +52,8 @@ class SlipsweepAccessor:
         width: float | str | None = None,
         grey: bool = False,
         ax: "Axes | None" = None,
+        equations: Sequence[str] | str = (),
+        magnitude: float | None = None,
     ) -> "Figure | Axes":
         """Draw a chart, as `slipsweep chart` does.
 
@@ -92,6 +94,11 @@ class SlipsweepAccessor:
             Draw without colour.
         ax : matplotlib.axes.Axes, optional
             Axes to draw a chart of one panel in, with its legend and caption.
+        equations : sequence of str or str
+            Published equations to draw beside, of `slipsweep.published.EQUATIONS`; with "curve",
+            "motions", "intensity" and "dimensionless".
+        magnitude : float, optional
+            Moment magnitude M, for the equations that need it.
 
         Returns
         -------
@@ -127,5 +134,7 @@ class SlipsweepAccessor:
             width=width,
             grey=grey,
             ax=ax,
+            equations=equations,
+            magnitude=magnitude,
         )
         return figure if ax is None else ax

@@ -17,6 +17,7 @@ from slipsweep.model.options import MODELS
 from slipsweep.model.units import quantity
 from slipsweep.model.variables import INTENSITY_MEASURES, PARAMETERS, SlidingMode, Validity
 from slipsweep.motion.waveforms import WAVEFORMS
+from slipsweep.published import check_equations
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -113,6 +114,8 @@ class Options:
     width: float | str | None = None
     grey: bool = False
     ax: "Axes | None" = None
+    equations: Sequence[str] | str = ()
+    magnitude: float | None = None
     more_panels: bool = False
     heights: list[float] = field(init=False)
     inches: float | None = field(init=False, default=None)
@@ -127,6 +130,9 @@ class Options:
             if not 0 < level < float("inf"):
                 raise InputError(f"levels: {level:g}: must be > 0")
         self.heights = sorted(found)
+        self.equations = check_equations(self.equations)
+        if self.magnitude is not None and not self.equations:
+            raise InputError(f"magnitude = {self.magnitude}: only with equations")
         if len(self.panels) > 2:
             raise InputError(f"--panels {','.join(self.panels)}: must be one axis or two")
         if isinstance(self.width, str):
