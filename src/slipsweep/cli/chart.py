@@ -53,6 +53,8 @@ def chart(
     ] = False,
     width: Annotated[Text, LOOK("Width of the figure: 90mm, 3.5inch.", "LENGTH")] = None,
     grey: Annotated[bool, LOOK("Draw without colour.", None, "--grey")] = False,
+    equations: options.Equations = None,
+    magnitude: options.Magnitude = None,
     output: Annotated[
         options.Paths,
         written(
@@ -64,6 +66,7 @@ def chart(
     """Draw design charts of a result."""
     given = output or []
     outputs.check_endings(given, FIGURES)
+    beside = options.compared(equations, magnitude)
 
     from slipsweep.charts import kinds, slices, style
     from slipsweep.files import opening, selection
@@ -77,7 +80,18 @@ def chart(
         result = slices.Result(data, file)
         axes = selection.own_names(data, typed)
         look = style.Options(
-            x, y, axes, across, variable, heights, units, show_cautions, width, grey
+            x,
+            y,
+            axes,
+            across,
+            variable,
+            heights,
+            units,
+            show_cautions,
+            width,
+            grey,
+            equations=beside,
+            magnitude=magnitude,
         )
         result.places(look.at)
         chosen = requested or kinds.fitting(result, look)
