@@ -16,6 +16,7 @@ ORDER = (
     "errors",
     "jit",
     "model",
+    "published",
     "motion",
     "kernels",
     "grid",

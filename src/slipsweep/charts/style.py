@@ -19,6 +19,7 @@ from slipsweep.model.options import MODELS
 from slipsweep.model.units import quantity
 from slipsweep.model.variables import INTENSITY_MEASURES, PARAMETERS, SlidingMode, Validity
 from slipsweep.motion.waveforms import WAVEFORMS
+from slipsweep.published import check_equations
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -130,6 +131,8 @@ class Options:
     title: str | None = None
     caption: Literal["full", "short"] | None = None
     ax: "Axes | None" = None
+    equations: Sequence[str] | str = ()
+    magnitude: float | None = None
     more_panels: bool = False
     heights: list[float] = field(init=False)
     inches: float | None = field(init=False, default=None)
@@ -144,6 +147,9 @@ class Options:
             if not 0 < level < float("inf"):
                 raise InputError(f"levels: {level:g}: must be > 0")
         self.heights = sorted(found)
+        self.equations = check_equations(self.equations)
+        if self.magnitude is not None and not self.equations:
+            raise InputError(f"magnitude = {self.magnitude}: only with equations")
         if len(self.panels) > 2:
             raise InputError(f"--panels {','.join(self.panels)}: must be one axis or two")
         if isinstance(self.width, str):
