@@ -25,6 +25,7 @@ def info(
     at: options.At = None,
 ) -> None:
     """Show what a result holds, how it was made, its shares of flags, and the statistics of a suite."""
+    from slipsweep.charts import solved
     from slipsweep.files import jobs, motions, opening, selection, storing
     from slipsweep.grid.tally import tally_of
     from slipsweep.motion.records import Record
@@ -48,6 +49,8 @@ def info(
         common.echo_tally(tally_of(table))
     except InputError as error:
         echo(f"modes and flags not counted: {error}")
+    if slides_back := solved.slides_back_text(table, recorded):
+        echo(f"caution: {slides_back}")
     if displacement and table.sizes.get("motion", 1) < 2 and "displacement_quantile" not in table:
         raise InputError(
             f"{file}: --displacement: is for results of a suite of motions, or of uncertain inputs"
