@@ -4,7 +4,6 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import matplotlib as mpl
@@ -304,10 +303,6 @@ def short_model_text(attributes: Mapping[Any, Any]) -> str:
     shaking = _shaking_text(attributes)
     if "suite" in attributes:
         shaking = f"suite of {attributes.get('motions', '?')} motions"
-    elif "record" in attributes:
-        shaking = shaking.replace(
-            plain(attributes["record"]), plain(Path(attributes["record"]).name), 1
-        )
     return f"{model}, {shaking}{f'; {inputs}' if inputs else ''}"
 
 

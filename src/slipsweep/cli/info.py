@@ -28,6 +28,7 @@ def info(
     magnitude: options.Magnitude = None,
 ) -> None:
     """Show what a result holds, how it was made, its shares of flags, and the statistics of a suite."""
+    from slipsweep.charts import solved
     from slipsweep.files import jobs, motions, opening, selection, storing
     from slipsweep.grid.tally import tally_of
     from slipsweep.motion.records import Record
@@ -55,6 +56,8 @@ def info(
         common.echo_tally(tally_of(table))
     except InputError as error:
         echo(f"modes and flags not counted: {error}")
+    if slides_back := solved.slides_back_text(table, recorded):
+        echo(f"caution: {slides_back}")
     has_statistics = table.sizes.get("motion", 1) > 1 or "displacement_quantile" in table
     if displacement and not (has_statistics or beside):
         raise InputError(
