@@ -14,6 +14,7 @@ PACKAGE = Path(slipsweep.__file__).parent
 ORDER = (
     "_version",
     "errors",
+    "locks",
     "jit",
     "model",
     "published",

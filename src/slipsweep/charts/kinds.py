@@ -158,7 +158,7 @@ def draw_all(
 
 def save(figure: Figure, path: Path, ending: str) -> None:
     """Write a figure in the format of an ending."""
-    content = io.BytesIO()  # matplotlib's writers leave a traceback on a full disk
+    content = io.BytesIO()  # to memory: matplotlib leaves a traceback where a disk is full
     figure.savefig(content, format=ending[1:], dpi=150)
     path.write_bytes(content.getvalue())
 
@@ -167,11 +167,12 @@ def write_book(path: Path, result: Result, figures: Iterable[Figure]) -> None:
     """Write a title page and some charts as pages of one PDF."""
     from matplotlib.backends.backend_pdf import PdfPages  # here: other charts do without it
 
-    with PdfPages(
-        path, metadata={"Title": str(result.attrs.get("title", "")), "Creator": "slipsweep"}
-    ) as pages:
+    content = io.BytesIO()  # as in `save`
+    about = {"Title": str(result.attrs.get("title", "")), "Creator": "slipsweep"}
+    with PdfPages(content, metadata=about) as pages:
         for figure in (title_page(result), *figures):
             pages.savefig(figure)
+    path.write_bytes(content.getvalue())
 
 
 def title_page(result: Result) -> Figure:
