@@ -32,7 +32,7 @@ def upslope_yield_acceleration(
     degrees.  Infinite where the angle reaches 90°.
     """
     angle = xr.apply_ufunc(np.arctan, yield_acceleration / g) + np.radians(2.0) * theta
-    onset = g * xr.apply_ufunc(np.tan, angle)
+    onset: xr.DataArray = g * xr.apply_ufunc(np.tan, angle)
     return onset.where(angle < 0.5 * math.pi, math.inf)
 
 
