@@ -14,8 +14,10 @@ PACKAGE = Path(slipsweep.__file__).parent
 ORDER = (
     "_version",
     "errors",
+    "locks",
     "jit",
     "model",
+    "published",
     "motion",
     "kernels",
     "grid",

@@ -80,6 +80,20 @@ def test_solvers_agree_on_a_few_cells(tmp_path: Path, monkeypatch: pytest.Monkey
             assert counts["cells"] == counts["agreed"], row
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name", ["Cell", "Chart", "Walk", "RecordedMotion", "StepByStep", "FirstUse"]
+)
+def test_tasks_whose_times_are_kept_run(name: str) -> None:
+    """Those of asv_bench, which asv itself would report as failed."""
+    task = runpy.run_path(str(ROOT / "asv_bench" / "benchmarks" / "speed.py"))[name]()
+    parameters = getattr(task, "params", [])[:1]
+    if hasattr(task, "setup"):
+        task.setup(*parameters)
+    (timed,) = [method for method in dir(task) if method.startswith(("time_", "track_"))]
+    getattr(task, timed)(*parameters)
+
+
 def test_other_waves_of_the_papers_peaks() -> None:
     """The tutorial quotes what a sweep gives of the stick-slip experiment."""
     harmonics = slipsweep.Harmonics((1.0, 0.3), (1, 3), (0.0, 180.0), cycles=5)

@@ -1,4 +1,4 @@
-"""Errors of two kinds, bad input and failed runs, and what to say to a name that is not known."""
+"""Errors of two kinds, bad input and failed runs, a warning, and what to say to an unknown name."""
 
 import difflib
 from collections.abc import Sequence
@@ -39,6 +39,10 @@ class RunError(RuntimeError):
     Traceback (most recent call last):
     slipsweep.errors.RunError: no annual rate: the model gives no value under any motion at two amplitudes or more
     """
+
+
+class RunWarning(UserWarning):
+    """A circumstance outside the input that costs time or safety, and no result (disk, locks)."""
 
 
 def did_you_mean(word: str, known: Sequence[str]) -> str:

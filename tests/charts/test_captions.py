@@ -49,16 +49,15 @@ def test_captions_are_short_or_full_on_request(lined: xr.Dataset) -> None:
     assert "Left out: does not come to rest, ends upslope." in narrow
 
 
-def test_short_captions_name_a_record_without_its_folder(tmp_path: Path) -> None:
-    source = Path("sweeps/data/synthetic.csv").read_text()
-    path = tmp_path / "here" / "motion.csv"
-    path.parent.mkdir()
-    path.write_text(source)
-    record = slipsweep.read_record(path)
-    result = slipsweep.sweep(5.0, 0.3, scale=[1.0, 1.5, 2.0], excitation=record, model="newmark")
-    figure = result.slipsweep.chart(caption="short")
-    assert "Newmark's block, record motion.csv; Üy estimated" in caption(figure)
-    assert str(tmp_path) not in caption(figure)
+def test_short_captions_have_no_paths_of_suites() -> None:
+    record = slipsweep.Record.sampled([0.0, 4.0, -3.0, 0.0], 0.2, "pulse")
+    suite = slipsweep.Suite((record, record), ("a", "b"), "/home/somebody/motions/*.AT2")
+    scales = [1.0, 1.5, 2.0]
+    result = slipsweep.sweep(5.0, 0.3, scale=scales, excitation=suite, model="newmark")
+    text = caption(result.slipsweep.chart(caption="short"))
+    assert "Newmark's block, suite of 2 motions; Üy estimated" in text
+    assert "somebody" not in text
+    assert "suite /home/somebody/motions/*.AT2" in caption(result.slipsweep.chart())
 
 
 @pytest.mark.parametrize("kind", ["contours", "families"])

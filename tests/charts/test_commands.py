@@ -107,7 +107,8 @@ def test_the_title_page_names_axes_and_flags(grid_file: Path) -> None:
     with slipsweep.open_result(grid_file) as data:
         title = kinds.title_page(Result(data, "grid.nc"))
     text = "\n".join(one.get_text() for one in title.texts)
-    assert " θ: 11 values, 0 to 20 degree" in text
+    assert "base inclination θ: 11 values, 0 to 20 degree" in text
+    assert "peak ground acceleration A: 53 values, 0.5 to 13.5 m s-2" in text
     for flag in maps.HATCHES:
         assert f"{(flag.name or '').lower()} (" in text
     for one in title.texts:

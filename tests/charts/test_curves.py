@@ -96,7 +96,10 @@ def test_the_dimensionless_chart_is_of_any_frequency(grid: xr.Dataset) -> None:
             there = np.isfinite(ys) & (ys > 0)
             expected = u * (2 * np.pi * FREQUENCIES[12]) ** 2 / AMPLITUDES
             np.testing.assert_allclose(ys[there], expected[there], rtol=1e-12)
-        assert figure.axes[0].get_xlabel().endswith("A / Üy")
+        assert figure.axes[0].get_xlabel() == "peak ground acceleration over yield, A / Üy"
+        assert figure.axes[0].get_ylabel() == "permanent displacement, u\u00a0ω²\u00a0/\u00a0A"
+        assert figure.axes[0].get_xlim()[0] == 1.0
+        assert figure.axes[0].get_xscale() == figure.axes[0].get_yscale() == "log"
 
 
 def test_curves_break_at_the_mode_limit(grid: xr.Dataset) -> None:
@@ -190,6 +193,56 @@ def test_spread_is_between_the_options_there_are(lined: xr.Dataset) -> None:
         assert label in legend(figure)
         rows.append(values)
     vertices = np.concatenate([path.vertices for path in named(figure, "spread")[0].get_paths()])
-    for amplitude, most in zip(amplitudes, np.max(rows, axis=0), strict=True):
+    ends = zip(np.min(rows, axis=0), np.max(rows, axis=0), strict=True)
+    for amplitude, (least, most) in zip(amplitudes, ends, strict=True):
         if most > 0:
-            assert vertices[vertices[:, 0] == amplitude, 1].max() == pytest.approx(most, rel=1e-12)
+            drawn = vertices[vertices[:, 0] == amplitude, 1]
+            assert drawn.max() == pytest.approx(most, rel=1e-12)
+            assert drawn.min() == pytest.approx(max(least, 1e-300), rel=1e-12)
+
+
+@pytest.mark.parametrize(("units", "factor"), [("m/s2", 1.0), ("g", 1.0 / 1.62)])
+def test_curves_and_thresholds_over_the_amplitude_in_both_units(units: str, factor: float) -> None:
+    """On the moon: "g" is the gravity of the result."""
+    amplitudes = np.linspace(0.1, 2.0, 20)
+    model = slipsweep.Mendez(g=1.62)
+    result = slipsweep.sweep(5.0, [0.4, 0.5], amplitudes, [1.0, 2.0], model=model)
+    figure = result.slipsweep.chart(at={"mu_s": 0.4, "frequency": 2}, units=units)
+    (line,) = labelled(figure, "this result")
+    expected = 1000.0 * result.permanent_displacement.sel(mu_s=0.4, frequency=2.0)
+    there = np.isfinite(line.get_ydata())
+    np.testing.assert_allclose(line.get_ydata()[there], expected[expected > 0.0], rtol=1e-12)
+    slides = amplitudes[(expected > 0.0).values]
+    np.testing.assert_allclose(line.get_xdata()[there], factor * slides, rtol=1e-12)
+    thresholds = slipsweep.friction_parameters(5.0, 0.4, 1.0, model=model)
+    for gid, name in (
+        ("yield_line", "yield_acceleration"),
+        ("limit_line", "limiting_acceleration"),
+    ):
+        (mark,) = named(figure, gid)
+        assert mark.get_xdata()[0] == pytest.approx(factor * thresholds[name].item(), rel=1e-12)
+    label = {"m/s2": "(m/s²)", "g": "(g)"}[units]
+    assert figure.axes[0].get_xlabel() == f"peak ground acceleration A {label}"
+    assert figure.axes[0].get_ylabel() == "permanent displacement, downslope (mm)"
+
+
+def test_families_have_their_unit_and_newmarks_curves_their_dash(grid: xr.Dataset) -> None:
+    """Velocities in m/s; of displacements in mm a thin curve of Newmark's block beside each."""
+    at: dict[str, Any] = {"theta": 6, "mu_s": 0.45, "frequency": (1.0, 5.0)}
+    figure = grid.slipsweep.chart("families", at=at, variable="peak_relative_velocity")
+    assert figure.axes[0].get_ylabel() == "largest downslope relative velocity (m/s)"
+    frequencies = grid.frequency.values[[14, 17]]
+    figure = grid.slipsweep.chart("families", at=at | {"frequency": tuple(frequencies)})
+    lines = labelled(figure, "f = ")
+    theirs = named(figure, "newmark")
+    for frequency, line, other in zip(frequencies, lines, theirs, strict=True):
+        assert line.get_label() == f"f = {frequency:.4g} Hz"
+        direct = slipsweep.sweep(
+            6.0, 0.45, AMPLITUDES, frequency, excitation=SINE, model="newmark"
+        ).permanent_displacement
+        np.testing.assert_allclose(
+            other.get_ydata(), 1000.0 * direct.where(direct > 0.0), rtol=1e-12
+        )
+        assert other.is_dashed() == line.is_dashed()
+    assert [line.is_dashed() for line in theirs] == [False, True]
+    assert "Newmark's block (same dash)" in legend(figure)

@@ -13,6 +13,7 @@ from slipsweep.charts.slices import Result
 from slipsweep.model.variables import NOTES
 from tests.support.charts import (
     LINED_SINE,
+    SINE,
     caption,
     inside,
     named,
@@ -88,6 +89,27 @@ def test_what_no_block_does_is_marked_and_its_share_told(lined: xr.Dataset) -> N
         "curve"
     )
     assert "falls with A" not in caption(sound)
+
+
+def test_a_fall_is_counted_against_an_amplitude_one_percent_smaller() -> None:
+    """Just beyond the jump at the mode limit the displacement falls, and is larger than before the jump."""
+    limit = slipsweep.friction_parameters(11.0, 0.25, 1.0).limiting_acceleration.item()
+    amplitudes = limit * np.array([0.55, 1.03, 1.06, 1.08])
+    block: dict[str, Any] = {"theta": 11.0, "mu_s": 0.25, "frequency": 1.0, "excitation": SINE}
+    result = slipsweep.sweep(**block, amplitude=amplitudes)
+    u = result.permanent_displacement.values
+    less, tenth = (
+        slipsweep.sweep(**block, amplitude=part * amplitudes).permanent_displacement.values
+        for part in (0.99, 0.9)
+    )
+    falls = (u > 0.0) & (u < less)
+    np.testing.assert_array_equal(falls, [False, True, True, True])
+    assert (u > tenth)[1:].all()
+    figure = result.slipsweep.chart()
+    (line,) = named(figure, "unsound")
+    drawn = line.get_xdata()[np.isfinite(line.get_ydata())]
+    np.testing.assert_array_equal(np.isin(amplitudes, drawn), falls)
+    assert "The displacement falls with A in 75 %" in caption(figure)
 
 
 def test_shares_of_what_is_unsound_are_those_of_all_cells() -> None:

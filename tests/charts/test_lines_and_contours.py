@@ -5,6 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.collections import QuadMesh
+from matplotlib.figure import Figure
 
 import slipsweep
 from slipsweep.charts import style
@@ -121,3 +123,59 @@ def test_ratio_to_newmark_is_that_of_a_direct_sweep(lined: xr.Dataset) -> None:
     low, middle, high = np.quantile(ratio, (0.05, 0.5, 0.95))
     text = f"median {middle:.3g}; 90 % of the sliding cells shown lie between {low:.3g} and {high:.3g}."
     assert text in caption(figure)
+
+
+def cells_of(figure: Figure) -> np.ndarray:
+    """Values of the cells under the contours; they are coloured by their decimal logarithm."""
+    (mesh,) = (one for one in figure.axes[0].collections if isinstance(one, QuadMesh))
+    logs: Any = mesh.get_array()
+    return np.asarray(10.0 ** np.ma.filled(logs, np.nan))
+
+
+def test_the_map_of_ratios_is_our_displacement_over_newmarks(lined: xr.Dataset) -> None:
+    """Cells coloured by the ratio; contours at levels and at their inverses."""
+    figure = lined.slipsweep.chart("newmark", at={"mu_s": 0.25, "frequency": 1})
+    given: dict[str, Any] = {
+        "theta": lined.theta.values,
+        "mu_s": 0.25,
+        "amplitude": lined.amplitude.values,
+        "frequency": 1.0,
+        "excitation": LINED_SINE,
+    }
+    ours = slipsweep.sweep(**given)
+    theirs = slipsweep.sweep(**given, model="newmark").permanent_displacement
+    kept = ~(slipsweep.flags(ours).not_recoupled | slipsweep.flags(ours).upslope)
+    ratio = (ours.permanent_displacement / theirs).where(kept & (theirs > 0.0))
+    drawn = cells_of(figure)
+    expected = ratio.transpose("amplitude", "theta").values
+    shown = np.isfinite(drawn)
+    assert shown.any()
+    np.testing.assert_allclose(drawn[shown], expected[shown], rtol=1e-12)
+    bar = figure.axes[-1]
+    assert bar.get_ylabel() == "displacement over that of Newmark's block"
+    texts = [text.get_text() for text in bar.get_yticklabels()]
+    assert "1.1" in texts
+    assert "0.91" in texts
+
+
+def test_cells_of_contours_have_the_colour_of_their_displacement(grid: xr.Dataset) -> None:
+    figure = grid.slipsweep.chart("contours", at={"theta": 6, "mu_s": 0.45})
+    moved = grid.sel(theta=6.0, mu_s=0.45).permanent_displacement
+    expected = moved.transpose("amplitude", "frequency").values
+    drawn = cells_of(figure)
+    shown = (expected > 1e-5) & np.isfinite(drawn)  # less is a hundredth of the lowest level
+    assert shown.sum() > 100
+    np.testing.assert_allclose(drawn[shown], expected[shown], rtol=1e-12)
+    bar = figure.axes[-1]
+    assert bar.get_ylabel() == "permanent displacement, downslope"
+    assert [text.get_text() for text in bar.get_yticklabels()][:3] == ["1 mm", "3 mm", "10 mm"]
+
+
+def test_every_cell_lies_under_the_patch_of_its_mode(grid: xr.Dataset) -> None:
+    figure = grid.slipsweep.chart("modes", x="frequency", at={"theta": 6, "mu_s": 0.45})
+    cells = grid.sel(theta=6.0, mu_s=0.45).transpose("amplitude", "frequency")
+    mesh = np.stack(np.meshgrid(grid.frequency, grid.amplitude), axis=-1).reshape(-1, 2)
+    for mode, text in style.MODE_TEXT.items():
+        (patch,) = named(figure, text)
+        covered = inside(patch, mesh).reshape(cells.sliding_mode.shape)
+        np.testing.assert_array_equal(covered, cells.sliding_mode == int(mode))

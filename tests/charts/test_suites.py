@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 
 import slipsweep
+from slipsweep.charts import solved
 from tests.support.charts import SUITE_AMPLITUDES, caption, drawn_as, legend, named
 
 G = 9.81
@@ -148,3 +149,18 @@ def test_a_regression_says_how_many_motions_it_leaves_out(both: xr.Dataset, show
     text = "Regression of ln u on the logarithm of the abscissa, of all motions that slide"
     assert f"{text}{f', but for {left} left out' if left else ''}; σ" in caption(figure)
     assert (left > 0) != shown
+
+
+def test_the_caption_counts_zeros_and_shares_of_cautions(result: xr.Dataset) -> None:
+    """Zeros at the grid point that has most of them; a caution's share of all values of the slice."""
+    at = {"theta": 5.0, "mu_s": 0.3}
+    flagged = result.sel(at).copy(deep=True)
+    zeros = (flagged.permanent_displacement == 0.0).sum(["motion", "polarity"])
+    assert zeros.min() < zeros.max()
+    two = {"amplitude": 6.0, "motion": flagged.motion.values[:2], "polarity": 1}
+    flagged.validity.loc[two] |= int(slipsweep.Validity.NOT_RECOUPLED)
+    text = caption(flagged.slipsweep.chart("motions", show_cautions=True))
+    assert f"Zero displacement: up to {int(zeros.max())} of 16; they lie below" in text
+    share = solved.percent(2 / flagged.validity.size)
+    cautions = "Statistics are of all values, also those with a caution: not_recoupled"
+    assert f"{cautions} {share}." in text

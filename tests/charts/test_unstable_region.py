@@ -104,19 +104,22 @@ def test_regions_end_where_the_block_begins_to_slide(
     assert white[(at["amplitude"] < onset - 0.06) & (onset > 0.06)].all()
 
     (area,) = named(figure, "statically_unstable")
-    inside = area.get_paths()[0].contains_points(np.stack([values[x], values[y]], axis=-1))
+    unstable = inside(area, np.stack([values[x], values[y]], axis=-1))
     rest_angle = np.degrees(np.arctan(at["mu_s"])) - at["theta"] + 0 * values[x]
     # straight between cells, where φ is not straight in μs
     off = 0.08 if "mu_s" in names else 0.001
-    assert inside.any()
-    assert (rest_angle[inside] < off).all()
-    assert inside[rest_angle < -off].all()
+    assert unstable.any()
+    assert (rest_angle[unstable] < off).all()
+    assert unstable[rest_angle < -off].all()
     assert is_near(colours[rest_angle < -0.2], maps.NO_VALUE).all()
-    # before it are the colours of what slides, or what is left out
-    left_out = named(figure, "not_recoupled") + named(figure, "upslope")
-    if kind == "modes" or not left_out:
-        before = colours[(rest_angle > 0.2) & (rest_angle < 1.0)]
-        assert not is_near(before, maps.NO_VALUE).any()
+    # before it are the colours of what slides, without a gap, and hatches of what is left out
+    grey = is_near(colours, maps.NO_VALUE) & (rest_angle > 0.2)
+    points = np.stack([values[x], values[y]], axis=-1)[grey]
+    left_out = np.zeros(len(points), bool)
+    for artist in named(figure, "not_recoupled") + named(figure, "upslope"):
+        left_out |= inside(artist, points)
+    # but for pixels that an edge runs through
+    assert np.count_nonzero(~left_out) < 5e-4 * len(colours)
 
 
 @pytest.mark.parametrize("names", MAPS, ids="-".join)

@@ -192,8 +192,14 @@ def limited() -> None:
 @pytest.mark.skipif(os.name != "posix", reason="limits the size of files the POSIX way")
 @pytest.mark.parametrize(
     "line",
-    ["run small.toml -o a.nc", "chart small.nc -k contours -o a.pdf", "export small.nc -o a.xlsx"],
+    [
+        "run small.toml -o a.nc",
+        "chart small.nc -k contours -o a.pdf",
+        "chart small.nc -k modes -k dimensionless -o a.pdf",
+        "export small.nc -o a.xlsx",
+    ],
 )
+@pytest.mark.usefixtures("without_layout")
 def test_a_full_disk_leaves_one_line_that_names_the_file(small: Path, line: str) -> None:
     *arguments, name = line.split()
     assert command(small, "run", "small.toml").returncode == 0

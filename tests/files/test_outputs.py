@@ -1,6 +1,9 @@
 """Outputs are complete or absent, and never what a command reads."""
 
+import errno
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -8,6 +11,7 @@ import pytest
 from slipsweep.cli import main
 from slipsweep.errors import InputError, RunError
 from slipsweep.files import outputs
+from tests.support.no_locks import refusing_locks
 
 SWEEP = """
 [axes]
@@ -75,6 +79,43 @@ def test_no_command_writes_what_it_reads(
     assert "is given twice" in refused(
         capfd, "chart", "a.nc", "--kind", "contours", "-o", "b.png", "-o", "b.png"
     )
+
+
+#: Commands one after the other, in a process of their own.
+SEVERAL = """
+import sys
+from slipsweep.cli import main
+print(*[main(line.split()) for line in sys.argv[1:]])
+"""
+
+
+def test_where_the_file_system_has_no_locks_the_setting_is_named_that_goes_without(
+    folder: Path,
+) -> None:
+    def ended(lines: list[str], **setting: str) -> tuple[str, list[str]]:
+        done = subprocess.run(
+            [sys.executable, "-c", SEVERAL, *lines],
+            cwd=folder,
+            env=os.environ | setting,
+            capture_output=True,
+            text=True,
+            timeout=300,
+            check=False,
+            preexec_fn=refusing_locks(errno.ENOLCK),
+        )
+        return done.stdout, done.stderr.splitlines()
+
+    lines = ["run a.toml -o n.nc -q", "info a.nc", "run a.toml -o n.zarr -q"]
+    status, (written, read, store) = ended(lines)
+    assert status == "1 2 0\n"
+    named = "the file system has no locks; set HDF5_USE_FILE_LOCKING=FALSE to go without"
+    assert written == f"slipsweep: error: n.nc: writing failed: Permission denied: {named}"
+    assert read == f"slipsweep: error: a.nc: cannot be read: {named}"
+    unseen = "the file system has no locks: a second run at this output would not be seen"
+    assert store == f"slipsweep: warning: n.zarr: {unseen}"
+    assert not (folder / "n.nc").exists()
+    lines = ["run a.toml -o n.nc -q", "export n.nc -o n.csv -q"]
+    assert ended(lines, HDF5_USE_FILE_LOCKING="FALSE") == ("0 0\n", [])
 
 
 def test_a_folder_that_is_no_store_is_kept(folder: Path, tmp_path: Path) -> None:

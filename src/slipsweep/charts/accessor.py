@@ -54,6 +54,8 @@ class SlipsweepAccessor:
         title: str | None = None,
         caption: Literal["full", "short"] | None = None,
         ax: "Axes | None" = None,
+        equations: Sequence[str] | str = (),
+        magnitude: float | None = None,
     ) -> "Figure | Axes":
         """Draw a chart, as `slipsweep chart` does.
 
@@ -99,6 +101,11 @@ class SlipsweepAccessor:
             to Newmark's block and the version; by default short where the width is below 127 mm.
         ax : matplotlib.axes.Axes, optional
             Axes to draw a chart of one panel in, with its legend and caption.
+        equations : sequence of str or str
+            Published equations to draw beside, of `slipsweep.published.EQUATIONS`; with "curve",
+            "motions", "intensity" and "dimensionless".
+        magnitude : float, optional
+            Moment magnitude M, for the equations that need it.
 
         Returns
         -------
@@ -136,5 +143,7 @@ class SlipsweepAccessor:
             title=title,
             caption=caption,
             ax=ax,
+            equations=equations,
+            magnitude=magnitude,
         )
         return figure if ax is None else ax

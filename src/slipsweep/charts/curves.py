@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from slipsweep.charts import solved, style
+from slipsweep.charts import equations, solved, style
 from slipsweep.charts.sheet import Panel, Sheet, curve_looks, log_axis, log_ticks, plot_curve
 from slipsweep.charts.slices import Result
 from slipsweep.charts.style import Look
@@ -123,8 +123,10 @@ def _drawn(sheet: Sheet, name: str, scaled: bool = False) -> Figure:
                 xscale="log", xlim=(1.0, None), xlabel="peak ground acceleration over yield, A / Üy"
             )
             log_ticks(panel.axes.xaxis, 10)
+            equations.draw_normalised(sheet, panel)
         else:
             _mark_accelerations(sheet, panel)
+            equations.draw_over_axis(sheet, panel)
     sheet.note_left_out(name)
     return sheet.done()
 

@@ -11,7 +11,17 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from slipsweep._version import __version__
-from slipsweep.charts import curves, histories, limits, maps, solved, statistics, style, suites
+from slipsweep.charts import (
+    curves,
+    equations,
+    histories,
+    limits,
+    maps,
+    solved,
+    statistics,
+    style,
+    suites,
+)
 from slipsweep.charts.slices import Result
 from slipsweep.charts.style import Options
 from slipsweep.errors import InputError, did_you_mean
@@ -70,6 +80,8 @@ def fitting(result: Result, options: Options) -> list[str]:
     """The kinds that are drawn of a result if none is named; with one axis left, its curve."""
     result.check_axes()
     kinds = kinds_of(result.sort)
+    if options.equations and (drawn := [kind for kind in kinds if kind in equations.KINDS]):
+        return drawn
     if result.sort != "sweep":
         return [
             kind for kind in kinds if kind != "sensitivity" or "total_index" in result.variables
@@ -97,6 +109,11 @@ def draw(result: Result, kind: str | None, options: Options) -> Figure:
         raise InputError(
             f"{result.name}: --kind {kind}: is {SORTS[result.sort][0]}: must be {allowed}"
         )
+    if options.equations and (
+        kind not in equations.KINDS or options.variable != solved.DISPLACEMENT
+    ):
+        drawn = f"--kind {', '.join(equations.KINDS)}, of {solved.DISPLACEMENT}"
+        raise InputError(f"{result.name}: --equations: not with --kind {kind}: only with {drawn}")
     for name in ("at", "x", "y", "panels", "levels"):
         if getattr(options, name) and not result.dims:
             raise InputError(f"{result.name}: --{name}: not with {kind}, which is drawn as a whole")
@@ -141,7 +158,7 @@ def draw_all(
 
 def save(figure: Figure, path: Path, ending: str) -> None:
     """Write a figure in the format of an ending."""
-    content = io.BytesIO()  # matplotlib's writers leave a traceback on a full disk
+    content = io.BytesIO()  # to memory: matplotlib leaves a traceback where a disk is full
     figure.savefig(content, format=ending[1:], dpi=150)
     path.write_bytes(content.getvalue())
 
@@ -150,11 +167,12 @@ def write_book(path: Path, result: Result, figures: Iterable[Figure]) -> None:
     """Write a title page and some charts as pages of one PDF."""
     from matplotlib.backends.backend_pdf import PdfPages  # here: other charts do without it
 
-    with PdfPages(
-        path, metadata={"Title": str(result.attrs.get("title", "")), "Creator": "slipsweep"}
-    ) as pages:
+    content = io.BytesIO()  # as in `save`
+    about = {"Title": str(result.attrs.get("title", "")), "Creator": "slipsweep"}
+    with PdfPages(content, metadata=about) as pages:
         for figure in (title_page(result), *figures):
             pages.savefig(figure)
+    path.write_bytes(content.getvalue())
 
 
 def title_page(result: Result) -> Figure:

@@ -23,6 +23,9 @@ from slipsweep.charts.style import Floats, Look, Options
 from slipsweep.errors import InputError
 from slipsweep.files.selection import axis_labels, axis_numbers
 from slipsweep.model.variables import Validity
+from slipsweep.motion.records import Record
+from slipsweep.motion.suites import Suite
+from slipsweep.studies.upslope import sliding_ways
 
 #: Dashes and markers of the curves of a family, and how many markers a curve has.
 _DASHES = (
@@ -323,6 +326,17 @@ class Sheet(Drawing):
             texts = " or ".join(solved.LEFT_OUT[flag] for flag in flags)
             words = ", ".join(style.FLAG_TEXT[flag] for flag in flags)
             self.note(f"{heading}: values flagged {texts}.", f"{heading}: {words}.")
+
+    def note_slides_back(self, motion: Record | Suite | None) -> None:
+        """Say of how many sliding cells the block would also slide upslope, which is left out."""
+        shown = solved.reliable(self.data, solved.DISPLACEMENT, self.options.show_cautions) > 0
+        ways = sliding_ways(self.data, motion)
+        if ways is not None and (shown & ways[1]).any():
+            percent = solved.percent(int((shown & ways[1]).sum()) / int(shown.sum()))
+            self.note(
+                f"In {percent} of the sliding cells shown {solved.SLIDES_BACK}.",
+                f"{percent} would also slide upslope: displacement too large.",
+            )
 
     def show(self, name: str, marked: str, always: bool = False) -> None:
         """Add to the slice what charts of a result draw.

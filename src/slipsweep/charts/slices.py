@@ -61,7 +61,10 @@ class Result:
         self.variables = [str(one) for one in data.data_vars if one in SHOWN]
         if not self.variables:
             raise InputError(f'{name}: not a result of "slipsweep run"')
-        self.motion = read_embedded(data, Path(name)) if self.sort == "record" else None
+        recorded = self.sort in ("record", "suite")
+        #: The recorded motion or motions, if the file has them; and the one to solve slices under.
+        self.shaking = read_embedded(data, Path(name)) if recorded else None
+        self.motion = self.shaking if self.sort == "record" else None
         data = data[self.variables]
         if 0 in data.sizes.values():
             raise InputError(f"{name}: holds no cells")
@@ -279,6 +282,8 @@ class Result:
         sheet = Sheet(self.select(names, kept, options.at), across, up, options, panels[:2])
         for side in ("x", "y") if y else () if isinstance(x, str) or across in NAMED else ("x",):
             sheet.set_axis(side)
+        if names[0] == DISPLACEMENT:
+            sheet.note_slides_back(self.shaking)
         return sheet
 
     def _axis(

@@ -1,7 +1,7 @@
 """What charts compute on their slice, and what a run warns of: thresholds, other options, trends that no block has."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable
 from typing import Any
 
 import numpy as np
@@ -18,8 +18,11 @@ from slipsweep.model.variables import (
     SlidingMode,
     Validity,
 )
+from slipsweep.motion.records import Record
+from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import WAVEFORMS, peak_acceleration
 from slipsweep.studies.datasets import friction_parameters, sweep
+from slipsweep.studies.upslope import sliding_ways
 
 #: Amplitudes of a motion.
 DRIVES = ("amplitude", "displacement_amplitude")
@@ -33,11 +36,22 @@ _LOOKED_AT_OTHERS = 25_000
 
 _BLOCK = ("theta", "mu_s", "yield_acceleration")
 
+#: Coordinates that decide which way a block slides.
+_DRIVING = (*_BLOCK, *DRIVES, *STRENGTHS[1:], "time_scale", "polarity", "azimuth", "motion")
+
 #: Flags of values that are unreliable, left out unless requested, and what captions say of them.
 LEFT_OUT = {
     Validity.NOT_RECOUPLED: "not_recoupled (does not come to rest within the cycle)",
     Validity.UPSLOPE: "upslope (ends above where it began)",
 }
+
+
+#: What is said of cells whose block would also slide upslope.
+SLIDES_BACK = (
+    "the base's acceleration also exceeds the upslope yield acceleration: sliding back is left "
+    "out, which makes the displacement too large; "
+    'sliding = "both" of [model] friction = "newmark" includes it'
+)
 
 
 def is_recorded(data: xr.Dataset) -> bool:
@@ -198,7 +212,8 @@ def unsound_texts(results: xr.Dataset) -> list[str]:
         return []
     how = (results.attrs.get("waveform"), results.attrs.get(SOLVERS.attribute, "cycle"))
     others = not is_recorded(results) and how != ("sine", "cycle")
-    some, counted = _counted(results, _LOOKED_AT_OTHERS if others else _LOOKED_AT)
+    most = _LOOKED_AT_OTHERS if others else _LOOKED_AT
+    some, counted = _counted(results, results[DISPLACEMENT].dims, most)
     some = some.load()
     drawn = reliable(some, DISPLACEMENT)
     texts = [unsound(some.assign({DISPLACEMENT: drawn}), drawn, newmark(some))[1]]
@@ -207,14 +222,37 @@ def unsound_texts(results: xr.Dataset) -> list[str]:
     return [text + counted for text in texts if text]
 
 
-def _counted(results: xr.Dataset, most: int) -> tuple[xr.Dataset, str]:
-    """Results of at most so many cells, evenly spaced, and what to say of it if these are not all."""
+def _counted(results: xr.Dataset, dims: Iterable[Hashable], most: int) -> tuple[xr.Dataset, str]:
+    """Results of at most so many cells along dimensions, and what to say of it if these are not all."""
+    sizes = {dim: results.sizes[dim] for dim in dims}
     some = results
-    while some[DISPLACEMENT].size > most:
-        sizes = some[DISPLACEMENT].sizes
-        some = some.isel({max(sizes, key=lambda dim: sizes[dim]): slice(1, None, 2)})
-    cells = some[DISPLACEMENT].size
+    while math.prod(sizes.values()) > most:
+        longest = max(sizes, key=lambda dim: sizes[dim])
+        some = some.isel({longest: slice(1, None, 2)})
+        sizes[longest] = some.sizes[longest]
+    cells = math.prod(sizes.values())
     return some, "" if some is results else f" (counted in {cells} cells, evenly spaced)"
+
+
+def slides_back_text(results: xr.Dataset, motion: Record | Suite | None = None) -> str:
+    """The share of the sliding cells whose block would also slide upslope, in words; empty if there are none.
+
+    It follows from the coordinates: no result is read.
+    """
+    there = [name for name in _DRIVING if name in results.coords]
+    if DISPLACEMENT not in results or {*DRIVES, *STRENGTHS}.isdisjoint(there):
+        return ""
+    if "displacement_amplitude" in there:
+        there.append("frequency")
+    dims = dict.fromkeys(dim for name in there for dim in results[name].dims)
+    unread = results.drop_vars({*results.data_vars} - {"ground_acceleration"})
+    some, counted = _counted(unread, dims, _LOOKED_AT)
+    ways = sliding_ways(some, motion)
+    if ways is None or not (ways[0] & ways[1]).any():
+        return ""
+    share = float((ways[0] & ways[1]).mean() / ways[0].mean())
+    cells = f"in {percent(share)} of the sliding cells " if dims else ""
+    return f"{cells}{SLIDES_BACK}{counted}"
 
 
 def estimated(data: xr.Dataset, drawn: xr.DataArray, continuous: xr.DataArray) -> str:

@@ -4,7 +4,6 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import matplotlib as mpl
@@ -19,6 +18,7 @@ from slipsweep.model.options import MODELS
 from slipsweep.model.units import quantity
 from slipsweep.model.variables import INTENSITY_MEASURES, PARAMETERS, SlidingMode, Validity
 from slipsweep.motion.waveforms import WAVEFORMS
+from slipsweep.published import check_equations
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -130,6 +130,8 @@ class Options:
     title: str | None = None
     caption: Literal["full", "short"] | None = None
     ax: "Axes | None" = None
+    equations: Sequence[str] | str = ()
+    magnitude: float | None = None
     more_panels: bool = False
     heights: list[float] = field(init=False)
     inches: float | None = field(init=False, default=None)
@@ -144,6 +146,9 @@ class Options:
             if not 0 < level < float("inf"):
                 raise InputError(f"levels: {level:g}: must be > 0")
         self.heights = sorted(found)
+        self.equations = check_equations(self.equations)
+        if self.magnitude is not None and not self.equations:
+            raise InputError(f"magnitude = {self.magnitude}: only with equations")
         if len(self.panels) > 2:
             raise InputError(f"--panels {','.join(self.panels)}: must be one axis or two")
         if isinstance(self.width, str):
@@ -298,10 +303,6 @@ def short_model_text(attributes: Mapping[Any, Any]) -> str:
     shaking = _shaking_text(attributes)
     if "suite" in attributes:
         shaking = f"suite of {attributes.get('motions', '?')} motions"
-    elif "record" in attributes:
-        shaking = shaking.replace(
-            plain(attributes["record"]), plain(Path(attributes["record"]).name), 1
-        )
     return f"{model}, {shaking}{f'; {inputs}' if inputs else ''}"
 
 

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from slipsweep.charts import solved, statistics, style
+from slipsweep.charts import equations, solved, statistics, style
 from slipsweep.charts.sheet import Panel, Sheet, log_axis, log_ticks, plot_curve
 from slipsweep.charts.slices import Result
 from slipsweep.charts.style import Floats, Look, Options
@@ -64,6 +64,7 @@ def motions(result: Result, options: Options) -> Figure:
             sheet.legend[f"median, {style.NEWMARK}"] = panel.axes.plot(
                 panel.xs, median, gid="newmark", **_NEWMARK
             )[0]
+        equations.draw_over_axis(sheet, panel)
     _note_suite(sheet, "Median and band are of", "they lie below the logarithmic axis")
     sheet.note_left_out(solved.DISPLACEMENT)
     _note_cautions(sheet)
@@ -99,6 +100,7 @@ def intensity(result: Result, options: Options) -> Figure:
                 own: Look = {"gid": name, "linestyle": "", **look}
                 (sheet.legend[name],) = panel.axes.plot(xs[which], heights[which], **own)
         _draw_regression(sheet, panel, xs, ys)
+        equations.draw_over_measure(sheet, panel, measure, xs)
     left_out = _sliding_left_out(sheet)
     but = f", but for {left_out} left out" if left_out else ""
     sheet.note(

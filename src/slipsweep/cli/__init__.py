@@ -7,9 +7,10 @@ that `slipsweep --help` is there at once.
 
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TextIO
 
 import typer
 from typer.core import TyperGroup
@@ -18,7 +19,7 @@ from slipsweep._version import __version__
 from slipsweep.cli import calibrate, chart, hazard, info, limit, run, simulate
 from slipsweep.cli.common import echo
 from slipsweep.cli.options import app
-from slipsweep.errors import InputError, RunError
+from slipsweep.errors import InputError, RunError, RunWarning
 
 
 class _Commands(TyperGroup):
@@ -51,6 +52,21 @@ def _message(error: Exception) -> str:
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename or 'what is printed'}: {error.strerror}"
     return str(error)
+
+
+def _show_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """Print a warning of the program in one line; those of libraries as Python does."""
+    if issubclass(category, RunWarning):
+        echo(f"slipsweep: warning: {message}", err=True)
+    else:
+        sys.stderr.write(warnings.formatwarning(message, category, filename, lineno, line))
 
 
 def _show_version(requested: bool) -> None:
@@ -105,11 +121,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")  # an alphabet without λ fails no command
-    try:
-        app(
-            list(sys.argv[1:] if arguments is None else arguments) or ["--help"],
-            prog_name="slipsweep",
-        )
-    except SystemExit as end:
-        return end.code if isinstance(end.code, int) else 0
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    with warnings.catch_warnings():
+        warnings.showwarning = _show_warning
+        try:
+            app(words or ["--help"], prog_name="slipsweep")
+        except SystemExit as end:
+            return end.code if isinstance(end.code, int) else 0
     return 0

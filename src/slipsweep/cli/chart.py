@@ -58,6 +58,8 @@ def chart(
         Literal["full", "short"] | None,
         LOOK("Caption: in full, or short (default: short below 127 mm)."),
     ] = None,
+    equations: options.Equations = None,
+    magnitude: options.Magnitude = None,
     output: Annotated[
         options.Paths,
         written(
@@ -69,6 +71,7 @@ def chart(
     """Draw design charts of a result."""
     given = output or []
     outputs.check_endings(given, FIGURES)
+    beside = options.compared(equations, magnitude)
 
     from slipsweep.charts import kinds, slices, style
     from slipsweep.files import opening, selection
@@ -82,7 +85,20 @@ def chart(
         result = slices.Result(data, file)
         axes = selection.own_names(data, typed)
         look = style.Options(
-            x, y, axes, across, variable, heights, units, show_cautions, width, grey, title, caption
+            x,
+            y,
+            axes,
+            across,
+            variable,
+            heights,
+            units,
+            show_cautions,
+            width,
+            grey,
+            title,
+            caption,
+            equations=beside,
+            magnitude=magnitude,
         )
         result.places(look.at)
         chosen = requested or kinds.fitting(result, look)

@@ -74,6 +74,12 @@ LENGTH = Panel("Displacement")(
     "--displacement",
     "-d",
 )
+PUBLISHED = Panel("Published equations")
+_BESIDE = "Published equations beside: jibson-2007,bray-travasarou-2007 (docs/published.md)."
+Equations = Annotated[Text, PUBLISHED(_BESIDE, "NAME,...")]
+Magnitude = Annotated[
+    float | None, PUBLISHED("Moment magnitude, for the equations that need it.", "M")
+]
 _AT = (
     "Values of an axis: theta=12, amplitude=0.1g,0.2g, case=LABEL (default: all); may be repeated."
 )
@@ -126,6 +132,17 @@ def displacements(texts: Sequence[str], g: float) -> list[float]:
         found.add(length)
     values = check_values("displacement", sorted(found), "--displacement")
     return [float(value) for value in values]
+
+
+def compared(equations: str | None, magnitude: float | None) -> tuple[str, ...]:
+    """Return the published equations that were typed (InputError: none such, a magnitude alone)."""
+    if magnitude is not None and equations is None:
+        raise InputError(f"--magnitude {magnitude:g}: only with --equations")
+    if equations is None:
+        return ()
+    from slipsweep.published import check_equations  # here: it needs NumPy, and `--help` does not
+
+    return check_equations(equations)
 
 
 def in_own_units(typed: Mapping[str, Any], g: float) -> dict[str, Any]:

@@ -146,6 +146,8 @@ def run(
     result = opening.read_result(report.path)
     echo(*filter(None, [solved.why_nothing_slides(template, report.tally)]))
     echo(*(f"unsound: {text}" for text in solved.unsound_texts(result)))
+    if slides_back := solved.slides_back_text(result, checked.recorded):
+        echo(f"caution: {slides_back}")
     common.echo_suite(result, most=20)
     echo(f"{report.path}  {size_text(storing.nbytes_of(report.path))}")
 

@@ -22,6 +22,7 @@ from slipsweep.files.selection import axis_values, places_at
 from slipsweep.grid.chunks import grid_chunks
 from slipsweep.grid.tally import tally_of
 from slipsweep.model.variables import LIMIT_RESULTS, MOTION_FILES, PARAMETERS, RESULTS
+from slipsweep.studies.published_statistics import published_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -54,6 +55,8 @@ def export(
     at: Mapping[str, str] | None = None,
     rows: Sequence[str] = (),
     columns: str | None = None,
+    equations: str | Sequence[str] = (),
+    magnitude: float | None = None,
     overwrite: bool = False,
     progress: Callable[[int], AbstractContextManager[Callable[[int], None] | None]] | None = None,
 ) -> int:
@@ -63,12 +66,15 @@ def export(
     that none of them has are left out.  Sliding modes and flags are codes or `words`, accelerations
     in m/s² or `in_g`, that of the model. `at` says which values to keep of an axis, as
     `slipsweep.files.selection.places_at`.  With `columns`, the axis along the columns of a pivoted
-    table, `rows` are those along its rows.  `progress` is given how many rows there are, and yields
+    table, `rows` are those along its rows.  With `equations` a spreadsheet has a sheet of that
+    name: `published_table`.  `progress` is given how many rows there are, and yields
     what to call with a number of rows just written.  InputError: `source` is not slipsweep's,
     `path` cannot be written, a variable, axis or value is not in the file, a spreadsheet cannot
     hold the table, or the package is missing that writes it.
     """
     _check_format(path)
+    if equations and path.suffix != ".xlsx":
+        raise InputError(f"{path}: --equations: are a sheet of their own: must end in .xlsx")
     check_outputs([path], overwrite, reads=[Path(source)])
     with read_result(source) as opened:
         whole = _in_g(opened) if in_g else opened
@@ -109,15 +115,21 @@ def export(
                 f"{path}: a table with --columns has one result; choose it with --variable "
                 f"({', '.join(table.name for table in tables)}), or write .xlsx, which has a sheet for each"
             )
+        beside = None
+        if equations:
+            cut = opened.isel(places_at(opened, source, at or {}, dims))
+            beside = published_table(cut, equations, magnitude)
         total = sum(table.count for table in tables)
         with (
             progress(total) if progress else nullcontext() as told,
             complete_or_absent(path, overwrite) as temporary,
         ):
-            write = {".csv": _write_csv, ".parquet": _write_parquet, ".xlsx": _write_workbook}[
-                path.suffix
-            ]
-            write(temporary, tables, source, told or (lambda rows: None))
+            done = told or (lambda rows: None)
+            if path.suffix == ".xlsx":
+                _write_workbook(temporary, tables, source, done, beside)
+            else:
+                write = _write_csv if path.suffix == ".csv" else _write_parquet
+                write(temporary, tables, source, done)
     return total
 
 
@@ -335,7 +347,11 @@ def _write_parquet(
 
 
 def _write_workbook(
-    path: Path, tables: list[Table], source: object, done: Callable[[int], None]
+    path: Path,
+    tables: list[Table],
+    source: object,
+    done: Callable[[int], None],
+    beside: "pd.DataFrame | None",
 ) -> None:
     import pandas as pd
 
@@ -361,6 +377,9 @@ def _write_workbook(
                 )
                 start += len(frame) + (start == 0)
                 done(len(frame))
+        if beside is not None:
+            beside.to_excel(book, sheet_name="equations", index=False)
+            book.sheets["equations"].set_column(0, beside.shape[1] - 1, 16)
         pd.DataFrame(_about(tables, source)).to_excel(
             book, sheet_name="about", header=False, index=False
         )

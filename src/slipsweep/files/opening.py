@@ -10,8 +10,10 @@ import xarray as xr
 
 from slipsweep.errors import InputError
 from slipsweep.files.motions import RECORD_DIM, SUITE_DIM
+from slipsweep.files.outputs import NO_LOCKS
 from slipsweep.files.selection import units_text
 from slipsweep.grid.chunks import CHUNK_CELLS, chunk_lengths
+from slipsweep.locks import has_locks
 from slipsweep.model import variables as known
 
 #: All that a command of slipsweep writes, but for the samples of records.
@@ -136,9 +138,11 @@ def _open(path: str | os.PathLike[str]) -> xr.Dataset:
         raise InputError(f"{path}: is neither a netCDF file nor a Zarr store of format 3")
     try:
         return xr.open_dataset(place, engine="netcdf4", **how)
-    except PermissionError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     except Exception as error:  # netCDF4 and xarray raise what they like on a damaged file
+        if not has_locks(place):
+            raise InputError(f"{path}: cannot be read: {NO_LOCKS}") from None
+        if isinstance(error, PermissionError):
+            raise InputError(f"{path}: cannot be read: {error.strerror}") from None
         made = "; of a sweep file slipsweep run makes one" if place.suffix == ".toml" else ""
         raise InputError(
             f"{path}: not a netCDF file, or a damaged one ({_first_line(error)}){made}"

@@ -13,9 +13,13 @@ from pathlib import Path
 
 from slipsweep.errors import InputError, RunError
 from slipsweep.grid.resources import size_text
+from slipsweep.locks import has_locks
 
 #: How an output that is there is refused.
 EXISTS = "{path}: exists already; give --overwrite to replace it, or another name with -o"
+
+#: What to do where the netCDF library cannot lock a file.
+NO_LOCKS = "the file system has no locks; set HDF5_USE_FILE_LOCKING=FALSE to go without"
 
 
 def check_endings(paths: Iterable[Path | str], endings: Collection[str]) -> None:
@@ -110,9 +114,12 @@ def writing(path: Path | str) -> Iterator[None]:
         if isinstance(error, RunError):
             raise
         message = f"{path}: writing failed: {(error.strerror if isinstance(error, OSError) else None) or error}"
+        folder = Path(path).parent
+        if str(path).endswith(".nc") and not has_locks(folder):
+            raise RunError(f"{message}: {NO_LOCKS}") from error
         # all that the netCDF library says of a full disk is "HDF error"
         with suppress(OSError):  # the folder itself may be gone
-            usage = shutil.disk_usage(Path(path).parent)
+            usage = shutil.disk_usage(folder)
             if usage.total:  # some file systems have no size, and are never full
                 message += f" ({size_text(usage.free)} free on the disk)"
         raise RunError(message) from error

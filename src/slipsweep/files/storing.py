@@ -14,8 +14,9 @@ import json
 import math
 import os
 import shutil
+import warnings
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -26,7 +27,7 @@ import numpy as np
 import xarray as xr
 from fsspec.core import url_to_fs
 
-from slipsweep.errors import InputError, RunError
+from slipsweep.errors import InputError, RunError, RunWarning
 from slipsweep.files import netcdf
 from slipsweep.files.jobs import Job
 from slipsweep.files.opening import check_zarr
@@ -34,6 +35,7 @@ from slipsweep.files.outputs import EXISTS, appear, writing
 from slipsweep.grid.chunks import Chunk, grid_chunks
 from slipsweep.grid.plans import Plan
 from slipsweep.grid.resources import size_text
+from slipsweep.locks import lock_held
 
 #: A file or folder, or the address of a store.
 Place = Path | str
@@ -86,10 +88,12 @@ class Chunks:
         InputError: neither may be done.  RunError: another run is writing it, or writing failed.  A
         note to any error says how many chunks are kept.
         """
-        with (
-            self._locked() if isinstance(self.path, Path) else nullcontext()
-        ):  # an address has no lock
+        # an address has no lock
+        with self._locked() if isinstance(self.path, Path) else nullcontext(True) as is_locked:
             self._begin(command, resume, overwrite)
+            if not is_locked:
+                text = "the file system has no locks: a second run at this output would not be seen"
+                warnings.warn(RunWarning(f"{self.path}: {text}"), stacklevel=2)
             try:
                 with writing(self.path):
                     yield
@@ -102,20 +106,18 @@ class Chunks:
                 raise
 
     @contextmanager
-    def _locked(self) -> Iterator[None]:
-        """Keep other runs away from this output."""
-        from filelock import FileLock, Timeout
-
+    def _locked(self) -> Iterator[bool]:
+        """Keep other runs away from this output; False where the file system has no locks."""
         folder = Path(self.place)
-        with writing(self.path):
-            folder.mkdir(exist_ok=True)
-            try:
-                held = FileLock(folder / "lock").acquire(timeout=0)
-            except Timeout:
-                raise RunError(f"{self.path}: another run is writing it") from None
         try:
-            with held:
-                yield
+            with ExitStack() as stack:
+                with writing(self.path):
+                    folder.mkdir(exist_ok=True)
+                    try:
+                        is_locked = stack.enter_context(lock_held(folder / "lock", timeout=0.0))
+                    except TimeoutError:
+                        raise RunError(f"{self.path}: another run is writing it") from None
+                yield is_locked
         finally:
             if folder.is_dir() and not (folder / "identity.json").exists() and not self._finished():
                 shutil.rmtree(folder, ignore_errors=True)

@@ -433,6 +433,18 @@ HAZARD_RESULTS: dict[str, dict[str, Any]] = {
     "valueless_share": _cf("1", "largest share of the motions without a value at any amplitude"),
 }
 
+#: What published equations add to statistics and annual rates.
+PUBLISHED_RESULTS: dict[str, dict[str, Any]] = {
+    "in_range": {
+        "long_name": "whether the inputs lie in the range of the equation",
+        "flag_values": [0, 1],
+        "flag_meanings": "outside inside",
+    },
+    "outside_rate": _cf(
+        "year-1", "part of the annual rate for which the equation is used outside of its range"
+    ),
+}
+
 #: dtype of each result; everything else is float64.
 RESULT_DTYPES: dict[str, str] = {
     "sliding_mode": "int8",

@@ -18,8 +18,9 @@ import xarray as xr
 from slipsweep.errors import InputError, RunError
 from slipsweep.model.parameters import check_numbers, number_text, shown
 from slipsweep.model.units import conversion
-from slipsweep.model.variables import HAZARD_RESULTS
+from slipsweep.model.variables import HAZARD_RESULTS, PARAMETERS, PUBLISHED_RESULTS, STRENGTHS
 from slipsweep.motion.lines import read_columns, read_lines
+from slipsweep.studies.published_statistics import published_statistics
 from slipsweep.studies.sampling import Floats, Thresholds
 from slipsweep.studies.suite_statistics import (
     THRESHOLDS,
@@ -50,6 +51,12 @@ _NO_RATE = r"probab|\bpoe\b|\baep\b|\bpe\b|\b\d+(?:\.\d+)?[ -]?(?:years?|yrs?|a)
 
 #: Spellings of the unit of an annual rate.
 _PER_YEAR = {"1/yr", "1/year", "1/a", "/yr", "/year", "yr-1", "year-1", "a-1", "per year"}
+
+#: Accelerations over a hazard curve at which published equations are evaluated.
+PUBLISHED_POINTS = 401
+
+#: Probability of exceedance at the start of a hazard curve from which on what lies below it counts.
+_LITTLE = 0.01
 
 #: Columns of OpenQuake's files: the probability of exceeding an acceleration, in g.
 _POE = re.compile(r"poe-(\d[\d.eE+-]*)(?::\w+)?")
@@ -284,6 +291,37 @@ def fragility(
     return found.transpose(..., "amplitude", "threshold")
 
 
+def published_fragility(
+    result: xr.Dataset,
+    curve: HazardCurve,
+    equations: str | Sequence[str],
+    thresholds: Thresholds | None = None,
+    magnitude: float | None = None,
+) -> xr.Dataset:
+    """Probability of exceeding displacements by published equations, as `fragility` of a suite.
+
+    The amplitudes are `PUBLISHED_POINTS` from one end of the hazard curve to the other: equations
+    need no motions, and of the result only the blocks.  `in_range` goes with it.
+    """
+    strengths = [*STRENGTHS, "displacement_amplitude"]
+    first = dict.fromkeys([name for name in strengths if name in result.dims], 0)
+    blocks = result.isel(first).drop_vars(strengths, errors="ignore")
+    amplitude = np.geomspace(curve.amplitude[0], curve.amplitude[-1], PUBLISHED_POINTS)
+    amplitude[[0, -1]] = curve.amplitude[[0, -1]]  # the ends without rounding
+    placed = blocks.assign_coords(amplitude=("amplitude", amplitude, PARAMETERS["amplitude"]))
+    found = published_statistics(
+        placed,
+        equations,
+        magnitude=magnitude,
+        thresholds=THRESHOLDS if thresholds is None else thresholds,
+        quantiles=0.5,
+    )
+    missing = found["exceedance_probability"].isel(threshold=0, drop=True).isnull()
+    found["valueless_share"] = missing.astype(np.float64)
+    wanted = ["exceedance_probability", "valueless_share", "in_range"]
+    return found[wanted].transpose(..., "amplitude", "threshold")
+
+
 def openquake_fragility(found: xr.Dataset) -> str:
     """A fragility as an XML file of OpenQuake (NRML 0.5): a discrete function for each grid point.
 
@@ -378,6 +416,8 @@ def displacement_hazard(
     thresholds: Thresholds | None = None,
     *,
     over: str | Sequence[str] | None = None,
+    equations: str | Sequence[str] | None = None,
+    magnitude: float | None = None,
 ) -> xr.Dataset:
     """Mean annual rates of exceeding displacements (Cornell [1]_), from a hazard curve and a fragility.
 
@@ -398,11 +438,16 @@ def displacement_hazard(
         default all.
     over : str or list of str, optional
         As in `suite_statistics`.
+    equations : str or list of str, optional
+        Names of published equations that take the place of the suite, as in `published_statistics`:
+        `result` then only has the blocks, and P is evaluated over the whole curve.
+    magnitude : float, optional
+        Moment magnitude M, for the equations that need it.
 
     Returns
     -------
     Dataset
-        Over all other dimensions and `threshold` (m), per year:
+        Over all other dimensions, `equation` if there are some, and `threshold` (m), per year:
 
         - `annual_rate`: NaN where fewer than two amplitudes have a value.
         - `held_rate`: the part of it from above the largest amplitude, or the end of the curve: P is held there.
@@ -411,6 +456,7 @@ def displacement_hazard(
         - `lower_rate`, `upper_rate`: the rate if P between two amplitudes is the lower, or the higher, of the two.  Far
           from each other, more amplitudes are needed.
         - `valueless_share`: the largest share of motions or samples without a value at any amplitude.
+        - `outside_rate`, of equations: the part of the rate that is outside of their range.
 
     Raises
     ------
@@ -445,10 +491,16 @@ def displacement_hazard(
         raise InputError(f"result = {shown(result)}: must be a Dataset")
     if not isinstance(curve, HazardCurve):
         curve = read_hazard_curve(curve, float(result.attrs.get("g", np.nan)))
-    found = fragility(result, thresholds, over)
+    if equations is None and magnitude is not None:
+        raise InputError(f"magnitude = {shown(magnitude)}: only with equations")
+    if equations is None:
+        found = fragility(result, thresholds, over)
+    else:
+        found = published_fragility(result, curve, equations, thresholds, magnitude)
     amplitude = found["amplitude"].values.astype(np.float64)
     chances = found["exceedance_probability"].variable
-    results = {name: xr.full_like(chances.sum("amplitude"), np.nan) for name in HAZARD_RESULTS}
+    names = [*HAZARD_RESULTS, *([] if equations is None else ["outside_rate"])]
+    results = {name: xr.full_like(chances.sum("amplitude"), np.nan) for name in names}
     results["valueless_share"] = found["valueless_share"].max("amplitude").variable
     for point in np.ndindex(chances.shape[:-2]):
         there = np.isfinite(chances.values[*point, :, 0])
@@ -458,16 +510,22 @@ def displacement_hazard(
                 "result: amplitude: only two peak ground accelerations have a value, and P(u > d) differs between "
                 "them; how it grows in between is not known: run the sweep with more values on the axis amplitude"
             )
-        for name, values in (
-            exceedance_rates(curve, amplitude[there], own).items() if len(own) > 1 else ()
-        ):
+        rates = exceedance_rates(curve, amplitude[there], own) if len(own) > 1 else {}
+        if rates and equations is not None:
+            outside = np.where(found["in_range"].values[*point, there, None], 0.0, own)
+            parts = exceedance_rates(curve, amplitude[there], outside)
+            rates["outside_rate"] = parts["annual_rate"]
+            # the least probability by a lognormal distribution is above 0
+            rates["omitted_rate"] = np.where(own[0] > _LITTLE, np.nan, 0.0)
+        for name, values in rates.items():
             results[name][point] = values
     if results["annual_rate"].isnull().all():
-        raise RunError(
-            "no annual rate: the model gives no value under any motion at two amplitudes or more"
-        )
+        why = "the model gives no value under any motion at two amplitudes or more"
+        if equations is not None:
+            why = "each block slides under its own weight"
+        raise RunError(f"no annual rate: {why}")
     for name, one in results.items():
-        one.attrs = HAZARD_RESULTS[name]
+        one.attrs = (HAZARD_RESULTS | PUBLISHED_RESULTS)[name]
     coords = {
         name: one.variable
         for name, one in found.coords.items()
