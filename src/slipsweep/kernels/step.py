@@ -63,10 +63,14 @@ class Slide(NamedTuple):
 
 
 class Law(NamedTuple):
-    """A friction law: μ(slide, Üg, v), with v in m/s, and whether it depends on v."""
+    """A friction law: μ(slide, Üg, v) with v in m/s, and whether it depends on v.
+
+    Newmark's block keeps its yield acceleration, or (`is_strength`) has that of Coulomb with μ.
+    """
 
     friction: Callable[..., float]
     knows_velocity: bool
+    is_strength: bool
 
 
 #: The cells that are stepped: a `Cell`, the yield acceleration upslope (NaN, if the block slides
@@ -183,14 +187,25 @@ def eq4_rate(law: Law, slide: Slide, ground: float, velocity: float) -> float:
 
 
 @inlined
+def newmark_acceleration(law: Law, slide: Slide, ground: float, velocity: float) -> float:
+    """Ü of Newmark's block: what it resists, by its yield acceleration or by Coulomb with μ."""
+    if law.is_strength:
+        friction = law.friction(slide, ground, velocity * slide.seconds)
+        if slide.phase == UP:
+            return -eq.coulomb_yield_acceleration(friction, -slide.tan_theta, slide.g)
+        return eq.coulomb_yield_acceleration(friction, slide.tan_theta, slide.g)
+    if slide.phase == UP:
+        return -slide.upslope_yield_acceleration
+    return slide.yield_acceleration
+
+
+@inlined
 def rate(law: Law, slide: Slide, ground: float, velocity: float) -> float:
     """Rate of V, Üg − Ü, in a phase; Eq. 12 takes no steps (`attenuate`)."""
     if slide.phase == HELD or slide.phase == HELD_ON:
         return ground - slide.held
-    if slide.phase == DOWN:
-        return ground - slide.yield_acceleration
-    if slide.phase == UP:
-        return ground + slide.upslope_yield_acceleration
+    if slide.phase == DOWN or slide.phase == UP:
+        return ground - newmark_acceleration(law, slide, ground, velocity)
     return eq4_rate(law, slide, ground, velocity)
 
 
@@ -439,7 +454,8 @@ def wait(
             low = middle
     # Eq. 4 is Üg there, but for rounding
     block.held = ground_at(block, piece, curve, high)
-    begin_slide(block, HELD, now + high, piece.finish - high)
+    phase = FOLLOWS if block.rise == LITERAL else HELD
+    begin_slide(block, phase, now + high, piece.finish - high)
     return high
 
 
@@ -839,7 +855,6 @@ def begin_pulse(
     if block.velocity < 0.0:
         rest(block)  # upslope motion, which continuous sliding may leave, is neglected
     if block.velocity > 0.0:
-        block.validity |= flags.NOT_RECOUPLED
         begin_stick_slip(law, block, rises, ground, time, growth)
     elif not rises and eq4_rate_at_rest(law, block, ground) > 0.0:  # Üg has jumped here, and falls
         begin_stick_slip(law, block, rises, ground, time, growth)
@@ -907,6 +922,9 @@ def walk(
                     points = steps.wave[steps.first[p] : steps.first[p + 1]]
                     step_along(law, block, piece, curve, rises, now, tau, until, points, history)
             if until == reaches and not block.in_pulse:
+                slides = block.velocity > 0.0 and block.rise != NEWMARK
+                if block.mode == eq.STICK_SLIP and slides:
+                    block.validity |= flags.NOT_RECOUPLED  # Eq. 12 has not brought it to rest
                 if is_record:
                     set_friction_of_pulse(law, block, cell, options, peak)
                 ground = max(block.amplitude * piece.first, block.yield_acceleration)
@@ -1201,5 +1219,5 @@ def solve_steps(
     `cells` are of dtype `STEP_CELL`; `blocks`, (1,), says how they are stepped; `results` is (fields
     of `Motion`, cells).
     """
-    law = Law(exponential_friction, False)
+    law = Law(exponential_friction, False, False)
     solve_cells(law, cells, options, path, blocks, steps, history, results)

@@ -1,8 +1,7 @@
 """Friction laws: the friction coefficient as a function of the base's acceleration.
 
-A law is a few small functions.  The stepping kernel (`kernels.step`) needs μ(|Üg|) alone, of any
-law that falls; the exact kernel (`kernels.exact`) needs the others, too (`FrictionLaw.missing`
-names those that a law lacks).  The law of the paper is `exponential`, Eq. 6; its original law, Eq.
+A law is a few small functions: the exact kernels integrate it in closed form.  The stepping kernel
+(`kernels.step`) takes any law μ(Üg, v), of which it needs no more than that.  The law of the paper is `exponential`, Eq. 6; its original law, Eq.
 5, is Eq. 6 with Δμ = 0.  To add a law: CONTRIBUTING.md.
 """
 
@@ -38,11 +37,6 @@ class FrictionLaw(NamedTuple):
     decay_length: Any = (
         None  # (decay_rate, g): the change of |Üg| over which μ falls to a part 1/e, or less
     )
-
-    @property
-    def missing(self) -> tuple[str, ...]:
-        """Names of the functions that the exact kernel needs and the law does not give."""
-        return tuple(name for name, function in self._asdict().items() if function is None)
 
 
 @registered

@@ -109,14 +109,15 @@ class Cycle(Choice):
 
 @dataclass(frozen=True)
 class Step(Choice):
-    """The solver that takes fixed steps in phase, cut at the events inside them.
+    """The solver that takes steps in time, cut where a phase of the motion ends.
 
     Parameters
     ----------
     rule : {"rectangle", "trapezoid", "simpson"}
         Orders 1, 2 and 4.
     steps_per_cycle : int
-        A multiple of 4, at least 8.
+        A multiple of 4, at least 8.  Under a record there is one step between two samples for each
+        64 of them, rounded up.
 
     Raises
     ------
