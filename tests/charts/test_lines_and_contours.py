@@ -127,9 +127,10 @@ def test_ratio_to_newmark_is_that_of_a_direct_sweep(lined: xr.Dataset) -> None:
 
 def cells_of(figure: Figure) -> np.ndarray:
     """Values of the cells under the contours; they are coloured by their decimal logarithm."""
-    (mesh,) = (one for one in figure.axes[0].collections if isinstance(one, QuadMesh))
-    logs: Any = mesh.get_array()
-    return np.asarray(10.0 ** np.ma.filled(logs, np.nan))
+    meshes = [one for one in figure.axes[0].collections if isinstance(one, QuadMesh)]
+    values = [np.ma.filled(np.ma.asarray(mesh.get_array()), np.nan) for mesh in meshes]
+    # a region that ends between two cells is drawn with the value of its last cell up to its edge
+    return np.asarray(10.0 ** np.where(np.isfinite(values[-1]), values[-1], values[0]))
 
 
 def test_the_map_of_ratios_is_our_displacement_over_newmarks(lined: xr.Dataset) -> None:
