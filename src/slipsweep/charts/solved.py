@@ -48,9 +48,8 @@ LEFT_OUT = {
 
 #: What is said of cells whose block would also slide upslope.
 SLIDES_BACK = (
-    "the base's acceleration also exceeds the upslope yield acceleration: sliding back is left "
-    "out, which makes the displacement too large; "
-    'sliding = "both" of [model] friction = "newmark" includes it'
+    "the base's acceleration also exceeds the upslope yield acceleration: the displacement is too "
+    'large; sliding = "both" of [model] friction = "newmark" includes sliding back'
 )
 
 

@@ -256,11 +256,22 @@ def _fill_tile(
                 why = f"{name} is then no finite number in double precision; must be nearer to 1"
                 raise InputError(f"{_inputs_at(wrong, problem, inputs)}: {why}")
     if "structure_frequency" in inputs and "validity" in results:
-        # a block that is not rigid, 0.2 ≤ f/fs ≤ 1.3
-        ratio = inputs["frequency"] / inputs["structure_frequency"]
-        results["validity"] |= ((ratio >= 0.2) & (ratio <= 1.3)) * np.int16(
-            known.Validity.FLEXIBLE_BLOCK
-        )
+        _flag_flexible(results["validity"], inputs["frequency"], inputs["structure_frequency"])
+
+
+def _flag_flexible(
+    validity: NDArray[np.int16], frequency: NDArray[Any], structure_frequency: NDArray[Any]
+) -> None:
+    """Flag blocks that are not rigid, 0.2 ≤ f/fs ≤ 1.3, piece by piece: f/fs takes four times as much as the flags."""
+    with np.nditer(
+        [validity, frequency, structure_frequency],
+        ["external_loop", "buffered", "zerosize_ok"],
+        [["readwrite"], ["readonly"], ["readonly"]],
+        buffersize=_LEAST_TILE,
+    ) as pieces:
+        for flags, f, fs in pieces:
+            ratio = f / fs
+            flags |= ((ratio >= 0.2) & (ratio <= 1.3)) * np.int16(known.Validity.FLEXIBLE_BLOCK)
 
 
 def _inputs_at(
