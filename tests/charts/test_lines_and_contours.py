@@ -130,10 +130,11 @@ def cells_of(figure: Figure, xs: Any, ys: Any) -> np.ndarray:
     points = np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2)
     drawn = np.full((len(ys), len(xs)), np.nan)
     for mesh in (one for one in figure.axes[0].collections if isinstance(one, QuadMesh)):
-        logs = np.ma.filled(np.ma.asarray(mesh.get_array()), np.nan)
+        logs: Any = np.ma.filled(np.ma.asarray(mesh.get_array()), np.nan)
         seen = np.ones(len(points), bool)
-        if mesh.get_clip_path() is not None:
-            region = mesh.get_clip_path().get_fully_transformed_path()
+        clip: Any = mesh.get_clip_path()
+        if clip is not None:
+            region = clip.get_fully_transformed_path()
             seen = region.contains_points(figure.axes[0].transData.transform(points))
         seen = seen.reshape(drawn.shape)
         drawn[seen] = 10.0 ** logs.reshape(drawn.shape)[seen]

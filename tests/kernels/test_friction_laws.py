@@ -31,20 +31,20 @@ RATE = 12.0
 @registered
 def falling(slide: step.Slide, ground: float, velocity: float) -> float:
     """Constantinou, Mokha and Reinhorn (1990), from μs down by `CHANGE` of it."""
-    return slide.mu_s * (1.0 - CHANGE * (1.0 - np.exp(-RATE * abs(velocity))))
+    return slide.mu_s * (1.0 - CHANGE * (1.0 - exp(-RATE * abs(velocity))))
 
 
 @registered
 def rising(slide: step.Slide, ground: float, velocity: float) -> float:
     """The same, upwards."""
-    return slide.mu_s * (1.0 + CHANGE * (1.0 - np.exp(-RATE * abs(velocity))))
+    return slide.mu_s * (1.0 + CHANGE * (1.0 - exp(-RATE * abs(velocity))))
 
 
 @registered
 def decaying_with_both(slide: step.Slide, ground: float, velocity: float) -> float:
     """Eq. 6, which also falls with the velocity."""
-    decayed = (slide.mu_s + slide.delta_mu) * np.exp(-slide.decay_rate * abs(ground) / slide.g)
-    return decayed * (1.0 - CHANGE * (1.0 - np.exp(-RATE * abs(velocity))))
+    decayed = (slide.mu_s + slide.delta_mu) * exp(-slide.decay_rate * abs(ground) / slide.g)
+    return decayed * (1.0 - CHANGE * (1.0 - exp(-RATE * abs(velocity))))
 
 
 @kernel
@@ -75,7 +75,7 @@ def motion_of(
     solve: Callable[..., None], rise: int, cycles: int, steps_per_cycle: int, **cell: float
 ) -> Motion:
     """Step a cell, by Simpson's rule; V and W are times ω and ω²."""
-    cells = np.full((1, len(step.STEP_CELL.names)), np.nan).view(step.STEP_CELL)[:, 0]
+    cells = np.full((1, len(step.STEP_CELL.names or ())), np.nan).view(step.STEP_CELL)[:, 0]
     cells["tan_theta"] = tan(THETA)
     cells["seconds"] = 1.0 / OMEGA
     for name, value in cell.items():

@@ -284,7 +284,7 @@ OPTIONS = [
 def test_records_are_stepped_as_they_are_walked(model: Any) -> None:
     """300 cells under records: modes alternate, pulses do not re-stick, v is upslope at times."""
     rng = np.random.default_rng(6)
-    times = np.arange(120) * 0.04
+    times: Any = np.arange(120) * 0.04
     for _ in range(5):
         samples = rng.normal(size=times.size).cumsum()
         record = slipsweep.Record(times, samples - np.linspace(samples[0], samples[-1], 120))
@@ -314,7 +314,7 @@ def test_records_are_stepped_as_they_are_walked(model: Any) -> None:
 
 def test_steps_under_a_record_are_of_second_order() -> None:
     """By the trapezoid: `steps_per_cycle` is 64 times the steps between two samples."""
-    times = np.arange(200) * 0.02
+    times: Any = np.arange(200) * 0.02
     record = slipsweep.Record(times, 5.0 * np.sin(9.0 * times) * np.exp(-0.3 * times))
     block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.4, "yield_acceleration": 0.8}
     exact = slipsweep.sweep(**block, excitation=record).permanent_displacement

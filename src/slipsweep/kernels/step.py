@@ -11,7 +11,7 @@ docs/numerics.md#step-solver
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -119,6 +119,10 @@ BLOCK = np.dtype(
 )
 
 
+#: A record of `BLOCK`; its fields have no types that mypy knows.
+Block: TypeAlias = Any
+
+
 class History(NamedTuple):
     """Samples of the motion, each (samples,); of the first `done[0]` Ü, V and W are filled in."""
 
@@ -163,7 +167,7 @@ def exponential_friction(slide: Slide, ground: float, velocity: float) -> float:
 
 
 @inlined
-def slide_of(block: np.record) -> Slide:
+def slide_of(block: Block) -> Slide:
     """What Ü of a block depends on in its phase."""
     return Slide(
         block.phase,
@@ -210,13 +214,13 @@ def rate(law: Law, slide: Slide, ground: float, velocity: float) -> float:
 
 
 @scalar
-def eq4_rate_at_rest(law: Law, block: np.record, ground: float) -> float:
+def eq4_rate_at_rest(law: Law, block: Block, ground: float) -> float:
     """Üg − Ü with Ü by Eq. 4 and V = 0: positive where a block at rest begins to slide."""
     return eq4_rate(law, slide_of(block), ground, 0.0)
 
 
 @scalar
-def eq4_of(law: Law, block: np.record, ground: float) -> float:
+def eq4_of(law: Law, block: Block, ground: float) -> float:
     """Ü by Eq. 4 at the velocity of the block."""
     return ground - eq4_rate(law, slide_of(block), ground, block.velocity)
 
@@ -309,7 +313,7 @@ def turning_point(
 
 
 @inlined
-def ground_at(block: np.record, piece: Piece, curve: Curve, tau: float) -> float:
+def ground_at(block: Block, piece: Piece, curve: Curve, tau: float) -> float:
     """Üg at τ on a piece, with the sign of the piece also where it is 0."""
     total = piece.slope * tau
     if piece.degree > 1:
@@ -321,7 +325,7 @@ def ground_at(block: np.record, piece: Piece, curve: Curve, tau: float) -> float
 
 @scalar
 def ground_in_step(
-    block: np.record, piece: Piece, curve: Curve, tau: float, h: float
+    block: Block, piece: Piece, curve: Curve, tau: float, h: float
 ) -> tuple[float, float, float]:
     """Üg at the start, the middle and the end of a step; in the middle a mean, if that will do."""
     start = ground_at(block, piece, curve, tau)
@@ -332,7 +336,7 @@ def ground_in_step(
 
 
 @scalar
-def place_of(block: np.record, piece: Piece, curve: Curve, level: float) -> float:
+def place_of(block: Block, piece: Piece, curve: Curve, level: float) -> float:
     """Return τ at which |Üg| reaches a level on a piece on which it grows (the end, if it does not)."""
     if block.amplitude * abs(piece.first) >= level:
         return piece.begin
@@ -349,7 +353,7 @@ def place_of(block: np.record, piece: Piece, curve: Curve, level: float) -> floa
 
 @scalar
 def advance_from(
-    law: Law, block: np.record, piece: Piece, curve: Curve, tau: float, h: float, first_rate: float
+    law: Law, block: Block, piece: Piece, curve: Curve, tau: float, h: float, first_rate: float
 ) -> tuple[tuple[float, float, float], float, float, float, float]:
     """Take a step from τ: return Üg in it, and what `advance` returns."""
     ground = ground_in_step(block, piece, curve, tau, h)
@@ -363,7 +367,7 @@ def advance_from(
 
 
 @scalar
-def rest(block: np.record) -> None:
+def rest(block: Block) -> None:
     """Come to rest."""
     block.phase = STUCK
     block.velocity = 0.0
@@ -373,7 +377,7 @@ def rest(block: np.record) -> None:
 
 
 @scalar
-def begin_slide(block: np.record, phase: int, time: float, growth: float) -> None:
+def begin_slide(block: Block, phase: int, time: float, growth: float) -> None:
     """Begin to slide, from rest or with a velocity kept."""
     block.phase = phase
     block.onset = time
@@ -384,7 +388,7 @@ def begin_slide(block: np.record, phase: int, time: float, growth: float) -> Non
 
 @scalar
 def begin_stick_slip(
-    law: Law, block: np.record, rises: bool, ground: float, time: float, growth: float
+    law: Law, block: Block, rises: bool, ground: float, time: float, growth: float
 ) -> None:
     """t1: begin to slide with b = max(Üy, Eq. 4), with the literal rise b by Eq. 4."""
     eq4 = eq4_of(law, block, ground)
@@ -394,7 +398,7 @@ def begin_stick_slip(
 
 
 @scalar
-def end_positive_half_wave(block: np.record) -> None:
+def end_positive_half_wave(block: Block) -> None:
     """t5: from Üg = 0 on Eq. 12 takes V to 0, with Ümax = b; or b is held on (`recoupling`)."""
     block.in_pulse = 0
     if block.phase == HELD or block.phase == FOLLOWS:
@@ -404,7 +408,7 @@ def end_positive_half_wave(block: np.record) -> None:
 
 
 @scalar
-def end_phase(block: np.record, eq4: float) -> None:
+def end_phase(block: Block, eq4: float) -> None:
     """Go on after a step up to the end of a phase, where `eq4` is Ü if it is by Eq. 4."""
     if block.phase == UP or block.velocity <= 0.0:
         rest(block)
@@ -416,7 +420,7 @@ def end_phase(block: np.record, eq4: float) -> None:
 
 
 @scalar
-def wait_for_newmark(block: np.record, piece: Piece, curve: Curve, now: float, tau: float) -> float:
+def wait_for_newmark(block: Block, piece: Piece, curve: Curve, now: float, tau: float) -> float:
     """Return τ at which Newmark's block at rest begins to slide: where Üg exceeds what it resists."""
     down = piece.top > 0.0
     limit = block.yield_acceleration if down else block.upslope_yield_acceleration
@@ -432,7 +436,7 @@ def wait_for_newmark(block: np.record, piece: Piece, curve: Curve, now: float, t
 
 @scalar
 def wait(
-    law: Law, block: np.record, piece: Piece, curve: Curve, now: float, tau: float, end: float
+    law: Law, block: Block, piece: Piece, curve: Curve, now: float, tau: float, end: float
 ) -> float:
     """Return τ at which the paper's block begins to slide while Üg rises beyond Üy: t1.
 
@@ -463,7 +467,7 @@ def wait(
 
 
 @scalar
-def sample_rest(block: np.record, until: float, history: History) -> None:
+def sample_rest(block: Block, until: float, history: History) -> None:
     """Fill in the samples before a time, up to which the block rests."""
     at = history.done[0]
     while at < history.phases.size and history.phases[at] < until:
@@ -476,7 +480,7 @@ def sample_rest(block: np.record, until: float, history: History) -> None:
 @scalar
 def sample_step(
     law: Law,
-    block: np.record,
+    block: Block,
     piece: Piece,
     curve: Curve,
     now: float,
@@ -502,7 +506,7 @@ def sample_step(
 
 
 @scalar
-def attenuate(block: np.record, time: float, duration: float, history: History) -> None:
+def attenuate(block: Block, time: float, duration: float, history: History) -> None:
     """Eq. 12 for some time, or up to the stop: one step V −= b h, which is exact for any h."""
     side = math.copysign(1.0, block.velocity)
     speed = abs(block.velocity)
@@ -528,7 +532,7 @@ def attenuate(block: np.record, time: float, duration: float, history: History) 
 @scalar
 def excess_after(
     law: Law,
-    block: np.record,
+    block: Block,
     piece: Piece,
     curve: Curve,
     rises: bool,
@@ -549,7 +553,7 @@ def excess_after(
 @scalar
 def step_to_end_of_phase(
     law: Law,
-    block: np.record,
+    block: Block,
     piece: Piece,
     curve: Curve,
     rises: bool,
@@ -591,7 +595,7 @@ def step_to_end_of_phase(
 @scalar
 def take_whole_steps(
     law: Law,
-    block: np.record,
+    block: Block,
     rises: bool,
     h: float,
     points: np.ndarray,
@@ -639,7 +643,7 @@ def take_whole_steps(
 @scalar
 def take_step(
     law: Law,
-    block: np.record,
+    block: Block,
     piece: Piece,
     curve: Curve,
     rises: bool,
@@ -704,7 +708,7 @@ def take_step(
 @scalar
 def step_along(
     law: Law,
-    block: np.record,
+    block: Block,
     piece: Piece,
     curve: Curve,
     rises: bool,
@@ -766,9 +770,7 @@ def step_along(
 
 
 @scalar
-def set_friction(
-    block: np.record, cell: np.record, options: Options, peak: float
-) -> flags.Interface:
+def set_friction(block: Block, cell: np.record, options: Options, peak: float) -> flags.Interface:
     """Set the block's friction and mode for shaking of that peak, by Eqs. 6-11."""
     parameters = Cell(
         cell.tan_theta,
@@ -790,7 +792,7 @@ def set_friction(
 
 
 @scalar
-def yield_governs(law: Law, block: np.record, low: float, high: float) -> bool:
+def yield_governs(law: Law, block: Block, low: float, high: float) -> bool:
     """Return whether Eq. 4 stays at or below Üy while Üg rises from low to high."""
     for j in range(POINTS_OF_RISE, -1, -1):
         ground = low + (high - low) * (j / POINTS_OF_RISE)
@@ -800,7 +802,7 @@ def yield_governs(law: Law, block: np.record, low: float, high: float) -> bool:
 
 
 @scalar
-def yield_governs_wave(law: Law, block: np.record, path: Path) -> bool:
+def yield_governs_wave(law: Law, block: Block, path: Path) -> bool:
     """Return whether Eq. 4 stays at or below Üy on all rises, and wherever Üg jumps to."""
     if block.mode != eq.STICK_SLIP or block.rise != MONOTONE:
         return False
@@ -817,7 +819,7 @@ def yield_governs_wave(law: Law, block: np.record, path: Path) -> bool:
 
 @scalar
 def set_friction_of_pulse(
-    law: Law, block: np.record, cell: np.record, options: Options, peak: float
+    law: Law, block: Block, cell: np.record, options: Options, peak: float
 ) -> None:
     """Under a record each pulse has the friction of its own peak, and with it a mode and flags."""
     block.stick_slip_pulses += 1.0
@@ -842,7 +844,7 @@ def set_friction_of_pulse(
 
 @scalar
 def begin_pulse(
-    law: Law, block: np.record, rises: bool, ground: float, time: float, growth: float
+    law: Law, block: Block, rises: bool, ground: float, time: float, growth: float
 ) -> None:
     """Go on from where Üg reaches Üy in a half wave; at rest the block waits for t1 (`wait`)."""
     block.in_pulse = 1
@@ -854,14 +856,12 @@ def begin_pulse(
         return
     if block.velocity < 0.0:
         rest(block)  # upslope motion, which continuous sliding may leave, is neglected
-    if block.velocity > 0.0:
-        begin_stick_slip(law, block, rises, ground, time, growth)
-    elif not rises and eq4_rate_at_rest(law, block, ground) > 0.0:  # Üg has jumped here, and falls
+    if block.velocity > 0.0 or (not rises and eq4_rate_at_rest(law, block, ground) > 0.0):
         begin_stick_slip(law, block, rises, ground, time, growth)
 
 
 @scalar
-def enter_rise_or_fall(law: Law, block: np.record, piece: Piece, rises: bool) -> None:
+def enter_rise_or_fall(law: Law, block: Block, piece: Piece, rises: bool) -> None:
     """Go on at the beginning of a piece: on a rise b is max(b, Eq. 4), on a fall it is held."""
     if not rises and block.phase == FOLLOWS:
         block.phase = HELD
@@ -876,7 +876,7 @@ def enter_rise_or_fall(law: Law, block: np.record, piece: Piece, rises: bool) ->
 @scalar
 def walk(
     law: Law,
-    block: np.record,
+    block: Block,
     cell: np.record,
     options: Options,
     path: Path,
@@ -933,7 +933,7 @@ def walk(
 
 
 @scalar
-def run_out(block: np.record, time: float, history: History) -> None:
+def run_out(block: Block, time: float, history: History) -> None:
     """After the shaking Eq. 12 takes V to 0, but that of continuous sliding under a waveform."""
     end_positive_half_wave(block)
     if block.phase == STUCK or block.validity & NO_VALUE != 0:
@@ -971,7 +971,7 @@ class Cycle(NamedTuple):
 
 
 @scalar
-def repetitions(block: np.record, cycle: Cycle, left: int) -> int:
+def repetitions(block: Block, cycle: Cycle, left: int) -> int:
     """Return how often the next cycles of that shape, at most `left`, gain what `cycle` did.
 
     They do so if they begin in the same state; and also with a larger V, if friction does not depend
@@ -988,7 +988,7 @@ def repetitions(block: np.record, cycle: Cycle, left: int) -> int:
 
 
 @scalar
-def repeat(block: np.record, cycle: Cycle, count: int) -> None:
+def repeat(block: Block, cycle: Cycle, count: int) -> None:
     """Add cycles that gain what `cycle` did."""
     period = 2.0 * math.pi
     later = count - 1.0
@@ -1006,7 +1006,7 @@ def repeat(block: np.record, cycle: Cycle, count: int) -> None:
 @single
 def walk_all(
     law: Law,
-    block: np.record,
+    block: Block,
     cell: np.record,
     options: Options,
     path: Path,
@@ -1062,7 +1062,7 @@ def walk_all(
 
 
 @scalar
-def validity_before(block: np.record, cell: np.record, options: Options, path: Path) -> int:
+def validity_before(block: Block, cell: np.record, options: Options, path: Path) -> int:
     """Set friction and mode for the peak of the shaking; return the flags known before the motion."""
     if block.steps_on_piece == 0:
         interface = set_friction(block, cell, options, block.amplitude)
@@ -1080,7 +1080,7 @@ def validity_before(block: np.record, cell: np.record, options: Options, path: P
 @single
 def solve_cell(
     law: Law,
-    block: np.record,
+    block: Block,
     cell: np.record,
     options: Options,
     path: Path,

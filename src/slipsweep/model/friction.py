@@ -1,8 +1,8 @@
 """Friction laws: the friction coefficient as a function of the base's acceleration.
 
 A law is a few small functions: the exact kernels integrate it in closed form.  The stepping kernel
-(`kernels.step`) takes any law μ(Üg, v), of which it needs no more than that.  The law of the paper is `exponential`, Eq. 6; its original law, Eq.
-5, is Eq. 6 with Δμ = 0.  To add a law: CONTRIBUTING.md.
+(`kernels.step`) takes any law μ(Üg, v), of which it needs no more than that.  The law of the paper
+is `exponential`, Eq. 6; its original law, Eq. 5, is Eq. 6 with Δμ = 0.
 """
 
 import math

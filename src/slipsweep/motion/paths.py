@@ -93,15 +93,14 @@ class Path(NamedTuple):
 def path_of(wave: Wave, recorded: bool) -> Path:
     """Return the path of a wave."""
     pieces = np.zeros(wave.pieces.size, PIECE)
-    for name in PIECE.names:
-        if name in wave.pieces.dtype.names:
-            pieces[name] = wave.pieces[name]
+    for name in set(pieces.dtype.fields or ()) & set(wave.pieces.dtype.fields or ()):
+        pieces[name] = wave.pieces[name]
     pieces["number"] = np.arange(pieces.size)
     pieces["slope"] = wave.pieces["coefficients"][:, 0]
     curved = np.flatnonzero(pieces["degree"] > 1)
     pieces["curve"][curved] = np.arange(curved.size)
     curves = np.zeros(max(curved.size, 1), CURVE)
-    for name in CURVE.names if curved.size else ():
+    for name in CURVE.fields or () if curved.size else ():
         curves[name] = wave.pieces[name][curved]
     intervals = np.zeros(wave.height.size, INTERVAL)
     intervals["first"] = wave.interval[:, 0]
