@@ -19,11 +19,16 @@ def _power(where: tuple[float, float], x: float) -> tuple[float, float]:
     return math.copysign(abs(x - root) ** power, x - root), power * abs(x - root) ** (power - 1.0)
 
 
-_root = events.root_of(_power)
+_root_of_power = events.root_of(_power)
+
+
+@numba.njit  # type: ignore[untyped-decorator]
+def _root(where: tuple[float, float], below: float, above: float) -> float:
+    return _root_of_power(where, below, above, above, 0.0)  # type: ignore[no-any-return]
 
 
 def found(root: float, power: float, below: float, above: float) -> float:
-    return float(_root((root, power), below, above, above, 0.0))
+    return float(_root((root, power), below, above))
 
 
 @pytest.mark.parametrize("root", [1e-300, 0.3, 0.9999999])

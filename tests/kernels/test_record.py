@@ -482,10 +482,6 @@ def test_the_block_slides_once_the_peak_passes_the_yield_acceleration(shaking: R
         ),
         ({"displacement_amplitude": 1.0}, "displacement_amplitude: not allowed with a Record"),
         ({"structure_frequency": 1.0}, "structure_frequency: not allowed with a Record"),
-        (
-            {"solver": "step"},
-            "solver = Step(rule='trapezoid', steps_per_cycle=1024): not allowed with a Record",
-        ),
     ],
 )
 def test_what_does_not_go_with_a_record(

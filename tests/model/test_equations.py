@@ -6,7 +6,6 @@ from typing import Any
 import numba
 import pytest
 
-from slipsweep.kernels.block import opposite
 from slipsweep.model import equations as eq
 
 MU_S = 0.38
@@ -107,4 +106,3 @@ def test_equations_answer_python_and_jitted_functions_alike() -> None:
     assert fractions == pytest.approx(
         [G * (MU_S - 0.2) + 0.7 * TAN_THETA * (MU_S - TAN_THETA - 0.2)] * 2, rel=1e-14
     )
-    assert [opposite(-1.0, 2.0), opposite(1.0, 2.0)] == [True, False]

@@ -4,6 +4,7 @@ Both models let a block slide downslope only, but for continuous sliding by the 
 level or gentle base a block also slides back, and ends near where it began.
 """
 
+import inspect
 import math
 from typing import Any
 
@@ -19,8 +20,8 @@ from slipsweep.motion.suites import Pair, Suite
 from slipsweep.motion.waveforms import WAVEFORMS, peak_acceleration
 
 #: Equations as they are written: compiled ones take single numbers, and a second to compile.
-_coulomb: Any = equations.coulomb_yield_acceleration.py_func  # type: ignore[attr-defined]
-_limit_denominator: Any = equations.limit_denominator.py_func  # type: ignore[attr-defined]
+_coulomb: Any = inspect.unwrap(equations.coulomb_yield_acceleration)
+_limit_denominator: Any = inspect.unwrap(equations.limit_denominator)
 
 
 def upslope_yield_acceleration(
