@@ -24,7 +24,7 @@ _root_of_power = events.root_of(_power)
 
 @numba.njit  # type: ignore[untyped-decorator]
 def _root(where: tuple[float, float], below: float, above: float) -> float:
-    return _root_of_power(where, below, above, above, 0.0)  # type: ignore[no-any-return]
+    return _root_of_power(where, below, above, above, 0.0)
 
 
 def found(root: float, power: float, below: float, above: float) -> float:
@@ -63,7 +63,7 @@ def test_a_cell_that_is_not_solved_ends_the_run_and_is_named(
     options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(solvers, "solve_waves", failing)
-    monkeypatch.setattr(solvers, "solve_steps", failing)
+    monkeypatch.setattr(solvers.step, "solve_steps", failing)
     axes: dict[str, Any] = {
         "theta": [0.0, 5.0],
         "mu_s": 0.3,
