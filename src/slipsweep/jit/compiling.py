@@ -128,5 +128,6 @@ def _digest_of_sources() -> str:
     sources = [
         path for room in ("model", "jit", "kernels") for path in (package / room).rglob("*.py")
     ]
-    contents = (path.read_bytes() for path in sorted([*sources, package / "motion" / "pieces.py"]))
+    sources += [package / "motion" / name for name in ("pieces.py", "paths.py")]
+    contents = (path.read_bytes() for path in sorted(sources))
     return hashlib.sha256(b"".join(contents)).hexdigest()[:16]

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from slipsweep.jit.decorators import inlined, registered
+from slipsweep.jit.decorators import equation, registered
 from slipsweep.jit.elementary import exp, log
 from slipsweep.model import equations as eq
 
@@ -82,7 +82,7 @@ _DECAYED = 708.0
 _SERIES = np.array([1.0 / math.factorial(k + 3) for k in range(21)])
 
 
-@inlined
+@equation
 def moments_of_decay(z: float) -> tuple[float, float, float, float]:
     """∫ e^(−zw) times 1, 1 − w, w and w (1 − w) over w from 0 to 1, for z ≥ 0.
 
@@ -118,7 +118,7 @@ def exponential_moments(
     return largest * whole, largest * early, largest * late, largest * both
 
 
-@inlined
+@equation
 def exponential() -> FrictionLaw:
     """Eq. 6, μ = (μs + Δμ) exp(−λ|Üg|/g), and with Δμ = 0 Eq. 5: the law of the paper."""
     return FrictionLaw(

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError
 from slipsweep.grid import engine, plans, resources, solvers
 from slipsweep.grid import inputs as grid_inputs
-from slipsweep.kernels import exact
 from slipsweep.kernels import history as kernels
 from slipsweep.kernels.block import Cell
 from slipsweep.model import options, parameters, variables
@@ -167,9 +166,9 @@ class _History:
         self.options = solvers.options_of(problem, wants_peak=True)
         self.record = motion if isinstance(motion, Record) else None
         if self.record is not None:
-            self.wave = cutting.wave_of_record(self.record, float(inputs["polarity"]))
+            self.path = cutting.path_of_record(self.record, float(inputs["polarity"]))
         else:
-            self.wave = cutting.wave_of(motion)
+            self.path = cutting.path_of_waveform(motion)
         #: Seconds that a phase takes: 1/ω, or the factor on the time of a record.
         self.unit = float(engine.phase_seconds(problem, inputs))
         self.valueless = bool(int(summary["validity"]) & variables.VALUELESS)
@@ -177,10 +176,13 @@ class _History:
     def sampled(self, phases: Floats) -> Floats:
         """The rows of `HISTORY` at phases, velocity and displacement in units of phase."""
         table = np.empty((len(HISTORY), phases.size))
-        workspace = exact.workspace_of(self.wave, keeps_log=True)
-        fill = kernels.fill_history if self.record is None else kernels.fill_recorded_history
         _interruptible(
-            fill, self.cell, self.options, self.wave, workspace, phases, kernels.History(*table)
+            kernels.fill_history,
+            self.cell,
+            self.options,
+            self.path,
+            phases,
+            kernels.History(*table),
         )
         if self.valueless:  # from the beginning on, also where the flag is raised later
             table[1:] = math.nan
@@ -212,16 +214,17 @@ class _History:
         if self.record is None:
             return {}
         with np.errstate(over="ignore"):
-            peak = self.wave.height * self.cell.amplitude
+            peak = self.path.intervals["height"] * self.cell.amplitude
         given = {**self.inputs, "amplitude": xr.Variable("half_wave", peak)}
         request = engine.Request(self.problem, {"half_wave": peak.size}, given, ("sliding_mode",))
         mode = engine.friction_parameters(request)["sliding_mode"].values
         if self.valueless:
             mode[:] = variables.SlidingMode.MISSING
-        first, after = self.wave.interval.T
+        first = self.path.intervals["first"]
+        after = self.path.intervals["end"]
         found = {
-            "half_wave_start": self.unit * self.wave.pieces["start"][first],
-            "half_wave_end": self.unit * self.wave.pieces["end"][after - 1],
+            "half_wave_start": self.unit * self.path.base.pieces["start"][first],
+            "half_wave_end": self.unit * self.path.base.pieces["end"][after - 1],
             "half_wave_peak": peak,
             "half_wave_mode": mode,
         }
