@@ -24,6 +24,7 @@ WRITES = {
     "model_trends": ["experiments.md", "sensitivity.md", "model_trends.md"],
     "agreement": ["agreement.md"],
     "limits": ["limits.md"],
+    "compiling": ["compiling.md"],
 }
 
 #: Half a minute of processes, clusters and compilation.

@@ -9,7 +9,7 @@ import pytest
 import slipsweep
 from slipsweep import RunError
 from slipsweep.grid import solvers
-from slipsweep.kernels import events
+from slipsweep.kernels import events, step
 from slipsweep.kernels.block import UNSOLVED
 
 
@@ -62,8 +62,8 @@ def failing(*arguments: Any) -> None:
 def test_a_cell_that_is_not_solved_ends_the_run_and_is_named(
     options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(solvers, "solve_waves", failing)
-    monkeypatch.setattr(solvers.step, "solve_steps", failing)
+    monkeypatch.setattr(solvers, "solve_walk", failing)
+    monkeypatch.setattr(step, "solve_steps", failing)
     axes: dict[str, Any] = {
         "theta": [0.0, 5.0],
         "mu_s": 0.3,
@@ -77,7 +77,7 @@ def test_a_cell_that_is_not_solved_ends_the_run_and_is_named(
 
 
 def test_a_cell_of_a_record_that_is_not_solved_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(solvers, "solve_record", failing)
+    monkeypatch.setattr(solvers, "solve_walk", failing)
     record = slipsweep.Record.sampled([0.0, 3.0, -3.0, 0.0], 0.1)
     axes: dict[str, Any] = {
         "theta": [0.0, 5.0],

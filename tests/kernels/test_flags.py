@@ -78,7 +78,7 @@ def _harmonics(amplitudes: list[float], phases: list[float], cycles: int) -> sli
 
 @pytest.mark.parametrize("larger_first", [False, True])
 def test_kd_is_that_of_the_instant_at_which_the_base_reverses(larger_first: bool) -> None:
-    """Two maxima in a half wave, Eq. 4 below zero at the smaller: no value only where that comes last.
+    """Two maxima in a half wave, Eq. 4 < 0 at the smaller: no value only where that is last.
 
     A wave, the same motion as a record, and steps say the same.
     """
@@ -110,17 +110,17 @@ def test_kd_is_that_of_the_instant_at_which_the_base_reverses(larger_first: bool
 
 @pytest.mark.parametrize("motion", ["sine", "triangle", "step", "record"])
 def test_under_the_literal_rise_yield_does_not_govern(motion: str) -> None:
-    """Eq. 4 below Üy is followed there: the result depends on λ, whose estimate is named, and is not Newmark's."""
+    """Eq. 4 is followed below Üy: the result depends on λ, whose estimate is named."""
     times = np.arange(21) / 4.0
     triangle = slipsweep.Record(times, 3.7 * np.array([0.0, *[1.0, 0.0, -1.0, 0.0] * 5]))
-    shakings: dict[str, dict[str, Any]] = {
+    motions: dict[str, dict[str, Any]] = {
         "sine": {"frequency": 1.0, "amplitude": 3.7},
         "triangle": {"frequency": 1.0, "amplitude": 3.7, "excitation": "triangle"},
         "step": {"frequency": 1.0, "amplitude": 3.7, "solver": "step"},
         "record": {"excitation": triangle},
     }
     literal = slipsweep.Mendez(rise="literal")
-    block: dict[str, Any] = {"theta": 12.0, "mu_s": 0.45, **shakings[motion]}
+    block: dict[str, Any] = {"theta": 12.0, "mu_s": 0.45, **motions[motion]}
     monotone = slipsweep.sweep(**block)
     found = slipsweep.sweep(**block, model=literal)
     other = slipsweep.sweep(**block, decay_rate=3.0, model=literal)
@@ -135,7 +135,7 @@ def test_under_the_literal_rise_yield_does_not_govern(motion: str) -> None:
 
 @pytest.mark.parametrize("solver", ["cycle", "step"])
 def test_newmark_which_has_no_eq12_has_no_flag_of_it(solver: str) -> None:
-    """The block slides on from one half wave into the next, as by integration with Eq. 4, which is flagged."""
+    """The block slides on into the next half wave, as one of the law does, which is flagged."""
     cell: dict[str, Any] = {
         "theta": 5.0,
         "mu_s": 0.3,

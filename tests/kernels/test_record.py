@@ -11,10 +11,11 @@ from gmpy2 import mpfr
 import slipsweep
 from slipsweep import InputError, Record, sweep
 from slipsweep.jit.compiling import kernel
-from slipsweep.kernels.block import EQ12, MONOTONE, Cell, Options, block_of, interface_of
-from slipsweep.kernels.eq4 import eq4_integrals
-from slipsweep.model.friction import exponential
-from slipsweep.motion.cutting import wave_of_record
+from slipsweep.kernels.block import EQ12, MONOTONE, Cell, Options, interface_of
+from slipsweep.kernels.eq4 import block_of, eq4_gains
+from slipsweep.kernels.slide import SLIDE
+from slipsweep.motion.cutting import path_of_record
+from slipsweep.motion.paths import Base
 from tests.support.block import Interface
 from tests.support.cases import choices
 from tests.support.digits import workdps
@@ -47,21 +48,20 @@ def shaking() -> Record:
 
 @kernel
 def _followed(
-    cell: tuple[float, float, float, float, float, float, float], pieces: np.ndarray
+    cell: tuple[float, float, float, float, float, float, float], base: Base, slides: np.ndarray
 ) -> tuple[float, float]:
     options = Options(MONOTONE, EQ12, 1, True, G)
-    block = block_of(
-        exponential(), 1.0, Cell(*cell), interface_of(Cell(*cell), MONOTONE, G), options
-    )
-    return eq4_integrals(block, pieces[0], pieces[0].begin, pieces[0].finish)
+    block = block_of(Cell(*cell), 1.0, interface_of(Cell(*cell), MONOTONE, G), options)
+    piece = base.pieces[0]
+    return eq4_gains(block, piece, base.curves[0], piece.begin, piece.finish, slides[0])
 
 
 def _follow(decay: float, x: float, change: float) -> tuple[float, float]:
     """Gains under Eq. 4 on a record of one piece, a second long."""
-    pieces = wave_of_record(Record.sampled([x, x + change], 1.0), 1.0).pieces
-    assert pieces.shape[0] == 1
+    base = path_of_record(Record.sampled([x, x + change], 1.0), 1.0).base
+    assert base.pieces.size == 1
     cell = (tan(radians(8.0)), 0.4, 1.0, 1.0, decay, 0.1, 0.1)
-    gains: tuple[float, float] = _followed(cell, pieces)
+    gains: tuple[float, float] = _followed(cell, base, np.zeros(1, SLIDE))
     return gains
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from slipsweep import InputError, Pair, Record, Suite, read_record, read_suite
-from slipsweep.motion.cutting import wave_of_record
+from slipsweep.motion.cutting import path_of_record
 from slipsweep.motion.intensity import arias_intensity
 from tests.support.intensity import measures_by_sums
 
@@ -95,7 +95,7 @@ def test_a_suite_is_compared_by_what_is_in_it(folder: Path) -> None:
     assert sent == one == read_suite(folder)
     assert hash(sent) == hash(one)
     # a worker gets it with every chunk, and makes the tables of its records once
-    assert wave_of_record(sent.components[0], 1.0) is wave_of_record(one.components[0], 1.0)
+    assert path_of_record(sent.components[0], 1.0) is path_of_record(one.components[0], 1.0)
     assert one != one[:2]
     assert one[:2] == one[["a", "b"]] == one[[0, 1]]
     changed = read_record(folder / "a.csv").corrected("mean")

@@ -9,11 +9,9 @@ import numpy as np
 from slipsweep.grid.inputs import Problem
 from slipsweep.kernels import block as physics
 from slipsweep.kernels import step
-from slipsweep.kernels.exact import workspace_of
 from slipsweep.kernels.grid import CELL, find_parameters
-from slipsweep.kernels.record import solve_record
 from slipsweep.kernels.sine.solve import solve_sine
-from slipsweep.kernels.waves import solve_waves
+from slipsweep.kernels.walk import solve_walk, workspace_of
 from slipsweep.model.options import Mendez, Step
 from slipsweep.model.variables import FRICTION_PARAMETERS
 from slipsweep.motion import cutting
@@ -74,8 +72,8 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
     options = options_of(problem, wants_peak)
 
     def under_wave(cells: np.ndarray, results: np.ndarray) -> None:
-        wave = cutting.wave_of(motion)
-        solve_waves(cells, options, wave, workspace_of(wave), results)
+        path = cutting.path_of_waveform(motion)
+        solve_walk(cells, options, path, *workspace_of(), results)
 
     def under_sine(cells: np.ndarray, results: np.ndarray) -> None:
         if solve_sine(cells, options, results):
@@ -91,10 +89,9 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
             lambda cells, results: stepper(cells, no_history, results), ROWS, step.STEP_CELL
         )
     if isinstance(motion, Record):
-        wave = cutting.wave_of_record(motion, polarity)
+        path = cutting.path_of_record(motion, polarity)
         return Solver(
-            lambda cells, results: solve_record(cells, options, wave, workspace_of(wave), results),
-            ROWS,
+            lambda cells, results: solve_walk(cells, options, path, *workspace_of(), results), ROWS
         )
     assert isinstance(motion, Waveform)
     return Solver(under_sine if is_plain_sine(motion) else under_wave, ROWS)

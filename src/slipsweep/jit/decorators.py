@@ -28,7 +28,7 @@ def part(*fastmath: str, **options: Any) -> Callable[[_Function], _Function]:
 #: Options of functions that only kernels call, which takes a quarter of the time to compile them:
 #: Python cannot call them.  They allocate nothing, and count no references to arrays: those are
 #: arguments of a kernel, which outlive it.
-_INTERNAL = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_INTERNAL = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
 
 #: A function that only kernels call.  `contract` lets the compiler fuse a*b + c, `arcp` divide by g
 #: once.  Not `reassoc`: sums whose order the compiler chooses have other last bits in the process
@@ -39,21 +39,19 @@ scalar = part("arcp", **_INTERNAL)
 #: inlined, which it does not do by itself with functions as long as these.
 inlined = part("arcp", forceinline=True, **_INTERNAL)
 
-#: The same for an equation, which Python calls, too.
-equation = part("arcp", forceinline=True)
-
-#: The same for a function with one caller and many callees, which numba would otherwise optimise
-#: once more.
-single = part("arcp", inline="always")
+#: The same for a function with one caller and many callees.  numba links, optimises and emits all
+#: that is below a function with each function above it.
+single = part("arcp", inline="always", **_INTERNAL)
 
 #: The same for elementary functions, which have no division to share.
 elementary = part("nsz", forceinline=True)
 
-#: The same for functions that are passed as values, those of a friction law: numba keeps a kernel
-#: on disk only if such a function is none that was compiled before.
-registered: Callable[[_Function], _Function] = numba.extending.register_jitable(
-    error_model="numpy", fastmath={"contract", "arcp"}, forceinline=True
+#: An equation: a function of Python, which kernels compile like `inlined`.  So it may be passed to
+#: them as a value, too.
+equation: Callable[[_Function], _Function] = numba.extending.register_jitable(
+    nogil=True, error_model="numpy", fastmath={"contract", "arcp"}, forceinline=True, **_INTERNAL
 )
+registered = equation
 
 _ffi = cffi.FFI()
 

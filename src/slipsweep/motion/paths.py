@@ -5,9 +5,10 @@ coefficients of 22 powers, those of a record of one: two types.  In a path the p
 one type, and the coefficients of the curved ones stand apart.
 """
 
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slipsweep.motion.pieces import Wave
 
@@ -16,8 +17,8 @@ from slipsweep.motion.pieces import Wave
 TERMS = 22
 
 #: A piece of a path, and the coefficients of a curved one: records of the dtypes below.
-Piece: TypeAlias = np.record
-Curve: TypeAlias = np.record
+Piece: TypeAlias = Any
+Curve: TypeAlias = Any
 
 PIECE = np.dtype(
     (
@@ -93,14 +94,16 @@ class Path(NamedTuple):
 def path_of(wave: Wave, recorded: bool) -> Path:
     """Return the path of a wave."""
     pieces = np.zeros(wave.pieces.size, PIECE)
-    for name in set(pieces.dtype.fields or ()) & set(wave.pieces.dtype.fields or ()):
+    for name in ("start", "end", "begin", "finish", "first", "last", "top", "degree"):
         pieces[name] = wave.pieces[name]
-    pieces["number"] = np.arange(pieces.size)
+    pieces["jumps"] = wave.pieces["jumps"]
+    pieces["arc"] = wave.pieces["arc"]
     pieces["slope"] = wave.pieces["coefficients"][:, 0]
+    pieces["number"] = np.arange(pieces.size)
     curved = np.flatnonzero(pieces["degree"] > 1)
     pieces["curve"][curved] = np.arange(curved.size)
     curves = np.zeros(max(curved.size, 1), CURVE)
-    for name in CURVE.fields or () if curved.size else ():
+    for name in ("coefficients", "once", "twice") if curved.size else ():
         curves[name] = wave.pieces[name][curved]
     intervals = np.zeros(wave.height.size, INTERVAL)
     intervals["first"] = wave.interval[:, 0]
@@ -119,3 +122,27 @@ def path_of(wave: Wave, recorded: bool) -> Path:
         repeats=wave.repeats,
         recorded=recorded,
     )
+
+
+def values_at(path: Path, phases: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return w at phases of the shaking, or at times of a record; at a jump the value after it."""
+    pieces = path.base.pieces
+    repeated = max(path.repeats - 1, 0)
+    cycle = np.zeros(phases.size, np.int64)  # of the shaking; `row` is that of the path
+    row = cycle
+    if not path.recorded:
+        cycles = path.cycles.size - 1 + repeated
+        cycle = np.clip(np.floor(phases / (2.0 * np.pi)).astype(np.int64), 0, cycles - 1)
+        row = np.where(cycle < path.lead, cycle, np.maximum(cycle - repeated, path.lead))
+    inside = phases - 2.0 * np.pi * (cycle - row)
+    p = np.searchsorted(pieces["start"], inside, side="right") - 1
+    p = np.clip(p, path.cycles["first"][row], path.cycles["first"][row + 1] - 1)
+    begin = pieces["begin"][p]
+    tau = np.clip(begin + (inside - pieces["start"][p]), begin, pieces["finish"][p])
+    offset = pieces["slope"][p] * tau
+    curved = pieces["degree"][p] > 1
+    offset[curved] = 0.0
+    for coefficient in path.base.curves["coefficients"][pieces["curve"][p][curved]].T[::-1]:
+        offset[curved] = (offset[curved] + coefficient) * tau[curved]
+    shaken = (pieces["start"][0] <= inside) & (inside < pieces["end"][-1])
+    return np.where(shaken, pieces["top"][p] + offset, 0.0)

@@ -102,25 +102,3 @@ def wave_of_pieces(
         lead=lead,
         repeats=repeats,
     )
-
-
-def values_at(wave: Wave, phases: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return w at phases of the shaking, or at times of a record; at a jump the value after it."""
-    pieces = wave.pieces
-    cycle = np.zeros(phases.size, np.int64)  # of the shaking, and of the table
-    row = cycle
-    if wave.shape.size > 1 or wave.repeats > 1:
-        cycles = wave.shape.size + max(wave.repeats - 1, 0)
-        cycle = np.clip(np.floor(phases / (2.0 * np.pi)).astype(np.int64), 0, cycles - 1)
-        later = cycle - max(wave.repeats - 1, 0)
-        row = np.where(cycle < wave.lead, cycle, np.maximum(later, wave.lead))
-    inside = phases - 2.0 * np.pi * (cycle - row)
-    p = np.searchsorted(pieces["start"], inside, side="right") - 1
-    p = np.clip(p, wave.cycle[row], wave.cycle[row + 1] - 1)
-    begin = pieces["begin"][p]
-    tau = np.clip(begin + (inside - pieces["start"][p]), begin, pieces["finish"][p])
-    total = np.zeros(phases.size)
-    for coefficient in pieces["coefficients"].T[::-1]:
-        total = (total + coefficient[p]) * tau
-    shaken = (pieces["start"][0] <= inside) & (inside < pieces["end"][-1])
-    return np.where(shaken, pieces["top"][p] + total, 0.0)

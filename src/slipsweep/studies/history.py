@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError
 from slipsweep.grid import engine, plans, resources, solvers
 from slipsweep.grid import inputs as grid_inputs
-from slipsweep.kernels import exact, step
 from slipsweep.kernels import history as kernels
+from slipsweep.kernels import step
 from slipsweep.kernels.block import Cell, Motion
 from slipsweep.model import options, parameters, variables
 from slipsweep.model.variables import HISTORY
 from slipsweep.motion import cutting
-from slipsweep.motion.pieces import values_at
+from slipsweep.motion.paths import values_at
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import Waveform
@@ -169,9 +169,9 @@ class _History:
         self.options = solvers.options_of(problem, wants_peak=True)
         self.record = motion if isinstance(motion, Record) else None
         if self.record is not None:
-            self.wave = cutting.wave_of_record(self.record, float(inputs["polarity"]))
+            self.path = cutting.path_of_record(self.record, float(inputs["polarity"]))
         else:
-            self.wave = cutting.wave_of(motion)
+            self.path = cutting.path_of_waveform(motion)
         #: Seconds that a phase takes: 1/ω, or the factor on the time of a record.
         self.unit = float(engine.phase_seconds(problem, inputs))
         self.valueless = bool(int(summary["validity"]) & variables.VALUELESS)
@@ -194,7 +194,7 @@ class _History:
         cells = np.full((1, len(step.STEP_CELL.names or ())), math.nan).view(step.STEP_CELL)[:, 0]
         for name, value in zip(Cell._fields, self.cell, strict=True):
             cells[name] = value
-        table[0] = self.cell.amplitude * values_at(self.wave, phases)
+        table[0] = self.cell.amplitude * values_at(self.path, phases)
         history = step.history_of(phases, table[0])
         _interruptible(stepper, cells, history, np.empty((len(Motion._fields), 1)))
         table[1] = history.block_acceleration
@@ -204,10 +204,13 @@ class _History:
 
     def _walk(self, phases: Floats, table: Floats) -> None:
         """Fill in a history from event to event."""
-        workspace = exact.workspace_of(self.wave, keeps_log=True)
-        fill = kernels.fill_history if self.record is None else kernels.fill_recorded_history
         _interruptible(
-            fill, self.cell, self.options, self.wave, workspace, phases, kernels.History(*table)
+            kernels.fill_history,
+            self.cell,
+            self.options,
+            self.path,
+            phases,
+            kernels.History(*table),
         )
 
     def columns(self, phases: Floats) -> dict[str, xr.Variable]:
@@ -236,16 +239,17 @@ class _History:
         if self.record is None:
             return {}
         with np.errstate(over="ignore"):
-            peak = self.wave.height * self.cell.amplitude
+            peak = self.path.intervals["height"] * self.cell.amplitude
         given = {**self.inputs, "amplitude": xr.Variable("half_wave", peak)}
         request = engine.Request(self.problem, {"half_wave": peak.size}, given, ("sliding_mode",))
         mode = engine.friction_parameters(request)["sliding_mode"].values
         if self.valueless:
             mode[:] = variables.SlidingMode.MISSING
-        first, after = self.wave.interval.T
+        first = self.path.intervals["first"]
+        after = self.path.intervals["end"]
         found = {
-            "half_wave_start": self.unit * self.wave.pieces["start"][first],
-            "half_wave_end": self.unit * self.wave.pieces["end"][after - 1],
+            "half_wave_start": self.unit * self.path.base.pieces["start"][first],
+            "half_wave_end": self.unit * self.path.base.pieces["end"][after - 1],
             "half_wave_peak": peak,
             "half_wave_mode": mode,
         }
