@@ -149,7 +149,11 @@ def echo_tally(tally: "Tally") -> None:
         )
     if tally.flags is not None:
         seen = variables.Validity(sum(flag for flag, count in tally.flags.items() if count))
-        echo("flags (validity):" if seen else "flags (validity): none")
+        echo("flags (validity):" if seen or tally.unflagged else "flags (validity): none")
+        if tally.unflagged:
+            echo(
+                f"  not known              {tally.share(tally.unflagged):9.2%}  {variables.UNFLAGGED_TEXT}"
+            )
         for kind in variables.FlagKind:
             flags = seen & variables.flags_of(kind)
             echo(*([f"  {kind}: {variables.FLAG_KIND_TEXT[kind]}"] if flags else ()))

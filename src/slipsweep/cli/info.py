@@ -72,7 +72,9 @@ def info(
 )
 def export(
     file: options.Result,
-    output: Annotated[Path, options.written("Write .csv, .parquet, .xlsx or .xml.")],
+    output: Annotated[
+        Path, options.written("Write .csv, .parquet, .xlsx (extras [parquet], [xlsx]) or .xml.")
+    ],
     variables: Annotated[
         Texts, TABLE("Result to export (default: all); may be repeated.", "NAME", "--variable")
     ] = None,

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.charts.style import SYMBOLS, caption, is_acceleration, unit
-from slipsweep.errors import InputError
+from slipsweep.errors import InputError, check_extra
 from slipsweep.explore.excerpt import LAYERS, SHOWN, Excerpt, read_excerpt
 from slipsweep.explore.figures import decades, figures, label, scale_of
 from slipsweep.explore.histories import POINTS, Histories, compute_histories
@@ -95,6 +95,7 @@ def write_page(
     InputError: the file cannot be read or drawn, `size` is too small, Bokeh is not installed, or
     the output exists. RunError: writing failed.
     """
+    check_extra("explore", "explore", "bokeh", "jinja2")  # which Bokeh brings along
     from jinja2 import Environment, PackageLoader
     from markupsafe import Markup
 
@@ -156,13 +157,9 @@ def _digest(script: str) -> str:
 
 
 def _bokeh_script() -> str:
-    """Bokeh's library, which is not among what slipsweep always needs."""
-    try:
-        from bokeh.resources import Resources
-    except ImportError:
-        raise InputError(
-            'explore draws with Bokeh, which is not installed: pip install "slipsweep[explore]"'
-        ) from None
+    """Bokeh's library."""
+    from bokeh.resources import Resources
+
     return "\n".join(Resources(mode="inline", components=["bokeh"]).js_raw)
 
 

@@ -3,7 +3,7 @@
 A worker that is lost costs its chunks once more: distributed computes them again on another.
 """
 
-import importlib.util
+import importlib
 import itertools
 import logging
 import math
@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 from slipsweep._version import __version__
-from slipsweep.errors import InputError, RunError
+from slipsweep.errors import InputError, RunError, check_extra
 from slipsweep.files import netcdf
 from slipsweep.files.jobs import RUN, Job
-from slipsweep.files.opening import read_result
+from slipsweep.files.opening import check_zarr, read_result
 from slipsweep.files.outputs import check_outputs, complete_or_absent
-from slipsweep.files.spec import named
+from slipsweep.files.spec import check_grid, named
 from slipsweep.files.storing import Chunks, Place, ZarrChunks
 from slipsweep.grid.chunks import CHUNK_CELLS, chunk_lengths
 from slipsweep.grid.plans import Plan
@@ -92,11 +92,12 @@ def run(
         raise InputError("--workers, --scheduler: give one of them, not both")
     if workers is not None and not 1 <= workers <= _MOST_WORKERS:
         raise InputError(f"--workers = {workers}: must be from 1 to {_MOST_WORKERS}")
-    if (workers or scheduler) and importlib.util.find_spec("distributed") is None:
-        raise InputError(
-            "--workers, --scheduler: need the package distributed: pip install 'slipsweep[cluster]'"
-        )
+    if workers or scheduler:
+        check_extra("--workers, --scheduler: a cluster", "cluster", "distributed")
     plan = job.plan
+    is_zarr = isinstance(path, str) or path.suffix == ".zarr"
+    if is_zarr:
+        check_zarr(path)
     if isinstance(path, Path):
         check_outputs([path], overwrite or resume, reads=job.spec.files)
     if resume and (complete := _complete(job, path)) is not None:
@@ -104,7 +105,6 @@ def run(
     processes = workers or (64 if scheduler else 0)
     most = _most_cells(plan, memory, workers or 0)
     lengths = chunk_lengths(plan.sizes, _chunk_cells(plan, most, processes), plan.together)
-    is_zarr = isinstance(path, str) or path.suffix == ".zarr"
     chunks = (ZarrChunks if is_zarr else Chunks)(job, path, lengths, most)
     if lengths == plan.sizes and not is_zarr and not processes and not Path(chunks.place).exists():
         with named(job.spec.source):
@@ -145,6 +145,7 @@ def _complete(job: Job, path: Place) -> xr.Dataset | None:
         raise InputError(
             f"{path}: is of another sweep or version; give --overwrite to replace it, or another name with -o"
         )
+    check_grid(found, job.plan.template().coords, path)
     return found
 
 

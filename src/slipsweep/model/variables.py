@@ -54,6 +54,9 @@ FLAG_KIND_TEXT: dict[FlagKind, str] = {
     FlagKind.NOTE: "no assumption is violated; a special rule or an estimate was used",
 }
 
+#: What is said of cells that have lost their flags.
+UNFLAGGED_TEXT = "another program has masked or joined these cells, and left them without flags"
+
 
 class Validity(IntFlag):
     """What is to be known of a cell's value, or why it has none; 0 means that no flag is raised.
