@@ -48,6 +48,7 @@ def info(
         common.echo_tally(tally_of(table))
     except InputError as error:
         echo(f"modes and flags not counted: {error}")
+    common.echo_unsound(table)
     if displacement and table.sizes.get("motion", 1) < 2 and "displacement_quantile" not in table:
         raise InputError(
             f"{file}: --displacement: is for results of a suite of motions, or of uncertain inputs"
@@ -56,7 +57,7 @@ def info(
     common.echo_suite(chosen, most=100, typed=displacement)
     for name, value in table.attrs.items():
         lines = str(value).splitlines()
-        if name != jobs.RUN:
+        if name not in (jobs.RUN, common.UNSOUND):
             echo(
                 f"{name}: {lines[0]}".rstrip()
                 if len(lines) == 1

@@ -247,6 +247,7 @@ def _notes(excerpt: Excerpt, histories: Histories | None) -> list[str]:
         math.prod(sizes[dim] for dim in excerpt.lengths)
         for sizes in (excerpt.sizes, excerpt.lengths)
     )
+    unsound = str(excerpt.table.attrs.get("unsound", "")).splitlines()
     notes = [f"All {shown:,} cells of the file are in this page."]
     if shown < whole:
         notes = [
@@ -263,6 +264,7 @@ def _notes(excerpt: Excerpt, histories: Histories | None) -> list[str]:
             "Quantiles and probabilities are those of all motions and polarities that have a value, as "
             "slipsweep.suite_statistics gives them."
         )
+    notes += [f"Unsound: {text}." for text in unsound]
     if histories is None:
         notes.append(
             "The page has no time histories. They need harmonic motion without uncertain inputs, and space in the "

@@ -9,7 +9,7 @@ import logging
 import math
 import signal
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -74,6 +74,7 @@ def run(
     workers: int | None = None,
     scheduler: str | None = None,
     progress: Callable[[int], None] | None = None,
+    remarks: Callable[[xr.Dataset], Mapping[str, str]] = lambda results: {},
 ) -> Report:
     """Solve a plan and write its results, complete or not at all.
 
@@ -81,7 +82,8 @@ def run(
     `command`, as typed, goes into its `history`.  `overwrite` replaces it and the chunks of an
     interrupted run, `resume` goes on with these, and leaves a complete output as it is.  The run
     takes so many bytes of `memory`, on so many `workers` of this machine or on those of a
-    `scheduler`.  `progress` is called with a number of cells just solved.
+    `scheduler`.  `progress` is called with a number of cells just solved.  `remarks` makes
+    attributes of the results, which go into the file before it gets its name.
 
     InputError: the output exists or cannot be written, the grid is too large for disk or memory, or
     there are chunks of an interrupted run, of another sweep or version, or without `resume` and
@@ -108,11 +110,10 @@ def run(
     chunks = (ZarrChunks if is_zarr else Chunks)(job, path, lengths, most)
     if lengths == plan.sizes and not is_zarr and not processes and not Path(chunks.place).exists():
         with named(job.spec.source):
-            table = plan.solve(progress)
+            table = job.described(plan.solve(progress), command)
+        table.attrs.update(remarks(table))
         with complete_or_absent(Path(path), overwrite) as temporary:
-            netcdf.write_table(
-                job.described(table, command), temporary, job.spec.output.compression
-            )
+            netcdf.write_table(table, temporary, job.spec.output.compression)
         return Report(path, tally_of(table))
     with chunks.begun(command, resume, overwrite), named(job.spec.source), ExitStack() as stack:
         kept = ((place, None) for place in chunks if place[0] in chunks.done)
@@ -127,7 +128,7 @@ def run(
             del results  # before the next is solved
             if progress is not None:
                 progress(plan.part(chunk).cells)
-        chunks.finish(overwrite)
+        chunks.finish(overwrite, remarks)
         return Report(path, tally_of(read_result(path)))
 
 

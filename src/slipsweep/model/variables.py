@@ -13,6 +13,10 @@ REFERENCE = (
     "frictional interfaces under harmonic loading, Soil Dynamics and Earthquake Engineering "
     "32, 152-158, https://doi.org/10.1016/j.soildyn.2011.08.007"
 )
+NEWMARK_REFERENCE = (
+    "N. M. Newmark (1965), Effects of earthquakes on dams and embankments, Géotechnique 15, "
+    "139-160, https://doi.org/10.1680/geot.1965.15.2.139"
+)
 
 
 class SlidingMode(IntEnum):
