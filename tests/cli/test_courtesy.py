@@ -6,9 +6,12 @@ import re
 import sys
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from slipsweep._version import __version__
+from slipsweep.files import running
+from slipsweep.files.opening import read_result
 from tests.support.commands import run_command
 
 BLOCK = ("simulate", "--theta", "5", "--mu-s", "0.38", "--frequency", "2")
@@ -165,6 +168,46 @@ def test_run_and_info_say_what_motions_lack(
         "record                  m/half.txt: "
         in (told("simulate", "--record", "m/half.txt", *BLOCK[1:5]).splitlines()[0])
     )
+
+
+def test_what_no_design_must_rest_on_goes_with_the_result(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    axes = SWEEP.replace("[4]", "[2, 4, 6, 8, 10, 12]").replace("[2]", "[1, 2]")
+    (tmp_path / "a.toml").write_text(axes)
+    assert told("run", "a.toml", "-q", "-o", "a.nc") == ""
+    whole = read_result("a.nc")
+    falls, continuous = whole.attrs["unsound"].splitlines()
+    assert falls.startswith("the displacement falls with A in ")
+    assert continuous.endswith(" slide continuously with estimated friction: not for design")
+    # in chunks, compressed, and in a store
+    monkeypatch.setattr(running, "CHUNK_CELLS", 6)
+    (tmp_path / "c.toml").write_text(f"{axes}[output]\ncompression = 1\n")
+    for sweep, output in (("a.toml", "b.nc"), ("c.toml", "c.nc"), ("a.toml", "b.zarr")):
+        told("run", sweep, "-q", "-o", output)
+        assert read_result(output).attrs["unsound"] == whole.attrs["unsound"]
+    lines = f"unsound: {falls}\nunsound: {continuous}\n"
+    assert lines in told("info", "a.nc")
+    assert lines in told("run", "a.toml", "-o", "again.nc")
+    assert lines in told("run", "a.toml", "-o", "again.nc", "--resume")
+    told("export", "a.nc", "-o", "a.xlsx")
+    rows = pd.read_excel("a.xlsx", sheet_name="about", header=None).ffill()
+    assert rows[rows[0] == "unsound"][1].tolist() == [falls, continuous]
+    told("explore", "a.nc")
+    assert f"Unsound: {continuous}." in Path("a.html").read_text("utf-8")
+    # a sound one says nothing
+    (tmp_path / "d.toml").write_text(f'{axes}[model]\nfriction = "newmark"\n')
+    assert "unsound" not in told("run", "d.toml", "-o", "d.nc")
+    assert "unsound" not in read_result("d.nc").attrs
+
+
+def test_a_history_not_for_design_says_so_in_its_file(tmp_path: Path) -> None:
+    output = tmp_path / "a.nc"
+    text = "continuous sliding with estimated friction: not for design"
+    assert f"unsound                 {text}\n" in told(*BLOCK, "--amplitude", "9", "-o", output)
+    assert read_result(output).attrs["unsound"] == text
+    assert f"unsound: {text}\n" in told("info", output)
 
 
 def test_hazard_of_samples_has_rows_for_each_frequency(tmp_path: Path) -> None:

@@ -365,6 +365,7 @@ def test_attributes_tell_how_it_was_made() -> None:
     stepped = slipsweep.sweep(**GOOD, model="newmark", solver=slipsweep.Step(rule="simpson")).attrs
     assert (stepped["rule"], stepped["steps_per_cycle"]) == ("simpson", 1024)
     assert not {"rise", "recoupling"} & {*stepped}
+    assert "10.1680/geot.1965.15.2.139" in stepped["references"]
     assert slipsweep.friction_parameters(5.0, 0.38, 3.0).attrs.keys() == {
         "title",
         "source",

@@ -182,7 +182,9 @@ def spread(result: Result, options: style.Options) -> Figure:
 
 def _alternatives(own: Model) -> Iterator[tuple[str, Model, dict[str, Any], Look]]:
     """What may be computed in place of a result: its name in the legend, model, changed parameters, and look."""
-    yield style.NEWMARK, Newmark(g=own.g), {}, {"color": "0.35", "linestyle": "-", "marker": "x"}
+    if isinstance(own, Mendez):
+        look: Look = {"color": "0.35", "linestyle": "-", "marker": "x"}
+        yield style.NEWMARK, Newmark(g=own.g), {}, look
     ours = own if isinstance(own, Mendez) else Mendez(g=own.g)
     for (recoupling, (end, colours)), (decay, (changed, dash)) in itertools.product(
         _ENDS.items(), _DECAYS.items()

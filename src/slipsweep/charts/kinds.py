@@ -27,7 +27,8 @@ from slipsweep.charts.style import Options
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.opening import values_text
 from slipsweep.files.selection import At, own_names
-from slipsweep.model.variables import PARAMETERS, REFERENCE
+from slipsweep.model.options import MODELS
+from slipsweep.model.variables import PARAMETERS, Validity
 
 Draw = Callable[[Result, Options], Figure]
 
@@ -61,6 +62,10 @@ SORTS: dict[str, tuple[str, tuple[Draw, ...]]] = {
     "calibration": ("a calibration", (histories.calibration,)),
     "hazard": ("annual rates", (limits.hazard,)),
 }
+
+
+#: Flags that charts hatch and Newmark's block can raise.
+_NEWMARK_FLAGS = (Validity.STATICALLY_UNSTABLE, Validity.FLEXIBLE_BLOCK)
 
 
 def kinds_of(sort: str) -> dict[str, Draw]:
@@ -188,6 +193,7 @@ def title_page(result: Result) -> Figure:
         for name, text in names.items()
         if name in coords
     ]
+    is_newmark = solved.is_newmark(result.data)
     compared = [
         "one interface (μs 0.38), two shaking-table tests: θ 5 and 6°, 0.36 and 0.52 g, 1.8 and 3.5 Hz"
     ]
@@ -197,8 +203,9 @@ def title_page(result: Result) -> Figure:
         "Results": [f"{name}: {style.SHOWN[name]['long_name']}" for name in result.variables],
         "Inputs": [*inputs, *filter(None, [style.drawn_text(attributes)])],
         "Model and estimates": style.model_text(attributes).splitlines(),
-        "Range in which the model was compared with measurements": compared,
     }
+    if not is_newmark:
+        sections["Range in which the model was compared with measurements"] = compared
     if unsound := solved.unsound_texts(result.data):
         sections["Unsound"] = unsound
     if not solved.is_recorded(result.data):
@@ -207,13 +214,14 @@ def title_page(result: Result) -> Figure:
             f"{style.FLAG_TEXT[flag]}: {style.flag_name(flag)} ({flag.kind}): {flag.text}"
             f"{left_out if flag in solved.LEFT_OUT else ''}"
             for flag in maps.HATCHES
+            if flag in _NEWMARK_FLAGS or not is_newmark
         ]
     sections["Origin"] = [
         style.plain(result.name),
         f"solved by {attributes.get('source', 'slipsweep')}",
         f"drawn by slipsweep {__version__}, matplotlib {mpl.__version__}",
         *style.plain(str(attributes.get("history", ""))).splitlines(),
-        REFERENCE,
+        MODELS.from_attributes(attributes).reference,
     ]
     figure = Figure(figsize=(8.27, 11.69))
     title = style.plain(textwrap.fill(str(attributes.get("title", "")), 54))

@@ -153,11 +153,12 @@ def has_flags(validity: xr.DataArray, flags: int) -> xr.DataArray:
 
 
 def reliable(results: xr.Dataset, name: str, show_cautions: bool = False) -> xr.DataArray:
-    """A result as it may be drawn: NaN where it is upslope, or left out for its flags."""
+    """A result as it may be drawn: NaN where it is upslope, or left out for its flags, or without any."""
     values = results[name]
     shown = values >= 0
     if "validity" in results and not show_cautions:
-        shown = shown & ~has_flags(results["validity"], sum(LEFT_OUT))
+        flags = results["validity"]
+        shown = shown & flags.notnull() & ~has_flags(flags, sum(LEFT_OUT))
     return values.where(shown).transpose(*values.dims)
 
 

@@ -150,7 +150,7 @@ def explore(
     ] = "10MB",
     quiet: options.Quiet = False,
 ) -> None:
-    """Write a page for the browser in which to explore a result."""
+    """Write a page for the browser in which to explore a result (extra \\[explore])."""
     from slipsweep.explore import page as pages
     from slipsweep.grid.resources import parse_size, size_text
 

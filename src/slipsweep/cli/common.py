@@ -2,7 +2,7 @@
 
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from slipsweep.files.storing import Place
     from slipsweep.grid.tally import Tally
     from slipsweep.motion.records import Record
+
+#: Attribute of a file that says what no design must rest on, a line for each reason.
+UNSOUND = "unsound"
 
 #: Endings of figures.
 FIGURES = (".png", ".svg", ".pdf")
@@ -56,8 +59,17 @@ def write_outputs(
                 kinds.save(figure, temporary, path.suffix)
 
 
-def run_job(job: "Job", path: "Place", large: Large, unit: str = "cells") -> "Report":
-    """Solve and write what a command computes, in chunks if need be."""
+def run_job(
+    job: "Job",
+    path: "Place",
+    large: Large,
+    unit: str = "cells",
+    remarks: "Callable[[xr.Dataset], Mapping[str, str]]" = lambda results: {},
+) -> "Report":
+    """Solve and write what a command computes, in chunks if need be.
+
+    `remarks` makes attributes of the results, which go into the file.
+    """
     from slipsweep.files import running
     from slipsweep.grid.resources import parse_size
 
@@ -68,7 +80,8 @@ def run_job(job: "Job", path: "Place", large: Large, unit: str = "cells") -> "Re
     given = {name: value for name, value in vars(large).items() if name != "quiet"}
     given["memory"] = None if large.memory is None else parse_size("--memory", large.memory)
     with progress_bar(job.plan.cells, large.quiet, unit) as progress:
-        report = running.run(job, path, command=typed_command(), progress=progress, **given)
+        given |= {"progress": progress, "remarks": remarks}
+        report = running.run(job, path, command=typed_command(), **given)
     if report.found and not large.quiet:
         echo(f"{path}: complete already, by the same sweep; nothing was computed")
     return report
@@ -137,6 +150,11 @@ def range_text(name: str, ends: Sequence[float], g: float) -> str:
     return f"{' to '.join(f'{end:.6g}' for end in ends)}{'' if units == '1' else f' {units}'}{in_g}"
 
 
+def echo_unsound(table: "xr.Dataset") -> None:
+    """Print what the file of a result says of it that no design must rest on."""
+    echo(*(f"{UNSOUND}: {text}" for text in str(table.attrs.get(UNSOUND, "")).splitlines()))
+
+
 def echo_tally(tally: "Tally") -> None:
     """Print the shares of sliding modes and of the flags that cells have, and what moves the displacement."""
     if tally.modes is not None:
@@ -149,7 +167,11 @@ def echo_tally(tally: "Tally") -> None:
         )
     if tally.flags is not None:
         seen = variables.Validity(sum(flag for flag, count in tally.flags.items() if count))
-        echo("flags (validity):" if seen else "flags (validity): none")
+        echo("flags (validity):" if seen or tally.unflagged else "flags (validity): none")
+        if tally.unflagged:
+            echo(
+                f"  not known              {tally.share(tally.unflagged):9.2%}  {variables.UNFLAGGED_TEXT}"
+            )
         for kind in variables.FlagKind:
             flags = seen & variables.flags_of(kind)
             echo(*([f"  {kind}: {variables.FLAG_KIND_TEXT[kind]}"] if flags else ()))

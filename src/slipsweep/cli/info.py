@@ -56,6 +56,7 @@ def info(
         common.echo_tally(tally_of(table))
     except InputError as error:
         echo(f"modes and flags not counted: {error}")
+    common.echo_unsound(table)
     if slides_back := solved.slides_back_text(table, recorded):
         echo(f"caution: {slides_back}")
     has_statistics = table.sizes.get("motion", 1) > 1 or "displacement_quantile" in table
@@ -73,7 +74,7 @@ def info(
         echo(*published_lines(chosen, beside, magnitude, lengths))
     for name, value in table.attrs.items():
         lines = str(value).splitlines()
-        if name != jobs.RUN:
+        if name not in (jobs.RUN, common.UNSOUND):
             echo(
                 f"{name}: {lines[0]}".rstrip()
                 if len(lines) == 1
@@ -90,7 +91,9 @@ def info(
 )
 def export(
     file: options.Result,
-    output: Annotated[Path, options.written("Write .csv, .parquet, .xlsx or .xml.")],
+    output: Annotated[
+        Path, options.written("Write .csv, .parquet, .xlsx (extras [parquet], [xlsx]) or .xml.")
+    ],
     variables: Annotated[
         Texts, TABLE("Result to export (default: all); may be repeated.", "NAME", "--variable")
     ] = None,

@@ -16,6 +16,8 @@ from slipsweep.model import variables
 from slipsweep.model.options import SOLVERS
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from slipsweep.files.spec import SweepSpec
 
 #: Factor on a recorded acceleration above which a motion is far from what was recorded.
@@ -109,14 +111,23 @@ def run(
     sampling = checked.sampling
     job = jobs.sweep_job(checked)
     unit = "cells" if sampling is None else "samples"
-    report = common.run_job(job, path, large, unit)
+    judged = 0.0  # seconds
+
+    def remarks(results: "xr.Dataset") -> dict[str, str]:
+        nonlocal judged
+        before = time.perf_counter()
+        texts = solved.unsound_texts(results)
+        judged += time.perf_counter() - before
+        return {common.UNSOUND: "\n".join(texts)} if texts else {}
+
+    report = common.run_job(job, path, large, unit, remarks)
     if large.quiet:
         return
     template = job.plan.template()
     if not report.found:
         cells = job.plan.cells
         grid = grid_text(job.plan.sizes) or "no axes"
-        passed = time.perf_counter() - started
+        passed = time.perf_counter() - started - judged
         once = compiling.seconds - compiled_before
         compiled = f" ({once:.2f} s to compile, once)" if once > 0.0 else ""
         took = f"in {passed:.2f} s{compiled}, {cells / max(passed - once, 1e-9):.3g} {unit}/s"
@@ -145,7 +156,7 @@ def run(
     common.echo_tally(report.tally)
     result = opening.read_result(report.path)
     echo(*filter(None, [solved.why_nothing_slides(template, report.tally)]))
-    echo(*(f"unsound: {text}" for text in solved.unsound_texts(result)))
+    common.echo_unsound(result)
     if slides_back := solved.slides_back_text(result, checked.recorded):
         echo(f"caution: {slides_back}")
     common.echo_suite(result, most=20)

@@ -127,6 +127,10 @@ def simulate(
         raise RunError(f"the model gives no value: {why} ({taken_as})")
 
     table.attrs["title"] = "Time history of a sliding block"
+    continuous = table.get("sliding_mode", 0) == variables.SlidingMode.CONTINUOUS
+    if continuous and validity & variables.Validity.FRICTION_ESTIMATED:
+        unsound = "continuous sliding with estimated friction: not for design"
+        table.attrs[common.UNSOUND] = unsound
     titles = {
         name: f"{name} ({table[name].attrs['units']})"
         for name in ("time", *variables.HISTORY)
@@ -158,7 +162,6 @@ def simulate(
     for kind in variables.FlagKind:
         flags = validity & variables.flags_of(kind)
         echo(*(f"{kind:<24}{(flag.name or '').lower()}: {flag.text}" for flag in flags))
-    continuous = table.get("sliding_mode", 0) == variables.SlidingMode.CONTINUOUS
-    if continuous and validity & variables.Validity.FRICTION_ESTIMATED:
-        echo("not for design          continuous sliding with estimated friction")
+    if common.UNSOUND in table.attrs:
+        echo(f"{common.UNSOUND:<24}{table.attrs[common.UNSOUND]}")
     echo(f"taken as                {taken_as}", *paths)

@@ -1,6 +1,5 @@
 """Results as tables in files, by pandas: CSV, Parquet or a spreadsheet, in pieces of `CHUNK_CELLS`."""
 
-import importlib
 import io
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -14,14 +13,20 @@ import numpy as np
 import xarray as xr
 
 from slipsweep._version import __version__
-from slipsweep.errors import InputError, did_you_mean
+from slipsweep.errors import InputError, check_extra, did_you_mean
 from slipsweep.files.netcdf import WITH_MISSING
 from slipsweep.files.opening import read_result, result_names, values_text
 from slipsweep.files.outputs import check_endings, check_outputs, complete_or_absent
 from slipsweep.files.selection import axis_values, places_at
 from slipsweep.grid.chunks import grid_chunks
 from slipsweep.grid.tally import tally_of
-from slipsweep.model.variables import LIMIT_RESULTS, MOTION_FILES, PARAMETERS, RESULTS
+from slipsweep.model.variables import (
+    LIMIT_RESULTS,
+    MOTION_FILES,
+    PARAMETERS,
+    RESULTS,
+    UNFLAGGED_TEXT,
+)
 from slipsweep.studies.published_statistics import published_table
 
 if TYPE_CHECKING:
@@ -30,10 +35,10 @@ if TYPE_CHECKING:
 #: Cells read at a time; text of ten columns takes a hundred times as many bytes.
 CHUNK_CELLS = 2**18
 
-#: Endings of tables, the module that writes each, and the extra that brings it.
+#: Endings of tables, the package that writes each, and the extra that brings it.
 SUFFIXES = {
     ".csv": ("csv", ""),
-    ".parquet": ("pyarrow.parquet", "parquet"),
+    ".parquet": ("pyarrow", "parquet"),
     ".xlsx": ("xlsxwriter", "xlsx"),
 }
 
@@ -134,15 +139,11 @@ def export(
 
 
 def _check_format(path: Path) -> None:
+    """Refuse a name that ends in no table's ending, or whose package is missing (InputError)."""
     check_endings([path], SUFFIXES)
-    module, extra = SUFFIXES[path.suffix]
-    try:
-        importlib.import_module(module)
-    except ImportError:
-        package = module.partition(".")[0]
-        raise InputError(
-            f"{path}: {path.suffix} needs {package}: pip install 'slipsweep[{extra}]', or give a name that ends in .csv"
-        ) from None
+    package, extra = SUFFIXES[path.suffix]
+    what = f"{path}: a table in {path.suffix}"
+    check_extra(what, extra, package, otherwise=", or give a name that ends in .csv")
 
 
 def _in_g(table: xr.Dataset) -> xr.Dataset:
@@ -243,9 +244,13 @@ class Table:
         """Values of a result as a table has them: codes that stand for no value missing, or in words."""
         import pandas as pd
 
-        if values.dtype.kind not in "iu":
+        if one.name == "validity" and values.dtype.kind == "f":  # some have lost their flags
+            missing = np.isnan(values)
+            values = np.where(missing, 0, values).astype(np.int16)
+        elif values.dtype.kind not in "iu":
             return values
-        missing = (values == -1) & (one.name in WITH_MISSING)
+        else:
+            missing = (values == -1) & (one.name in WITH_MISSING)
         about = (LIMIT_RESULTS | RESULTS).get(str(one.name), {}) | one.attrs
         if self.words and "flag_meanings" in about:
             return (
@@ -408,6 +413,9 @@ def _about(tables: list[Table], source: object) -> list[tuple[str, str]]:
                         f"{flag.kind}: {share}; {flag.text}",
                     )
                 )
+            if tally.unflagged:
+                share = f"{tally.share(tally.unflagged):.2%} of {tally.cells} cells"
+                rows.append(("flags not known", f"{share}; {UNFLAGGED_TEXT}"))
     for name, text in part.attrs.items():  # line by line: a cell does not hold a long text
         rows += [("" if at else str(name), line) for at, line in enumerate(str(text).splitlines())]
     return rows

@@ -119,6 +119,22 @@ class SweepSpec:
         """The recorded motion or motions, where these are the shaking."""
         return None if isinstance(self.excitation, Waveform) else self.excitation
 
+    @property
+    def grid(self) -> dict[str, xr.DataArray]:
+        """Coordinates by which cells of the result differ, and parameters with one value."""
+        over = () if self.sampling is None else self.sampling.over
+        grid = {}
+        for name, value in self.inputs.given.items():
+            values = [1, -1] if isinstance(value, str) else value  # polarity = "both"
+            grid[name] = (
+                values
+                if isinstance(values, xr.DataArray)
+                else xr.DataArray(values, dims=(name,) * np.ndim(values))
+            )
+        if isinstance(self.recorded, suites.Suite):
+            grid["motion"] = xr.DataArray(np.array(self.recorded.labels), dims="motion")
+        return {name: values for name, values in grid.items() if name not in over}
+
     def plan(self) -> "Plan":
         """Return what the sweep file describes: a sweep, or the statistics of samples (InputError as `sweep`)."""
         chosen: dict[str, Any] = {
@@ -174,12 +190,13 @@ def is_stream(path: Path) -> bool:
 def _load_result(path: Path) -> SweepSpec:
     with opening.read_result(path) as file:
         attributes = file.attrs
+        if "sweep" not in attributes:
+            raise InputError(
+                f'{path}: no attribute "sweep": only a result of "slipsweep run" can be repeated'
+            )
         recorded = motions.read_embedded(file, path)
-    if "sweep" not in attributes:
-        raise InputError(
-            f'{path}: no attribute "sweep": only a result of "slipsweep run" can be repeated'
-        )
-    spec = parse(str(attributes["sweep"]), str(path), path.parent, recorded)
+        spec = parse(str(attributes["sweep"]), str(path), path.parent, recorded)
+        check_grid(file, spec.grid, path)
     # the solver that ran: it may have been chosen on the command line, over the sweep file's
     with named(str(path)):
         return (
@@ -187,6 +204,36 @@ def _load_result(path: Path) -> SweepSpec:
             if "solver" in attributes
             else spec
         )
+
+
+def check_grid(result: xr.Dataset, grid: Mapping[Any, xr.DataArray], source: object) -> None:
+    """Refuse a result whose grid is not that of its sweep (InputError): it was joined or cut."""
+    known = {*variables.STATISTIC_COORDINATES, motions.RECORD_DIM, motions.SUITE_DIM}
+    known |= {str(dim) for values in grid.values() for dim in values.dims}
+    since = "results were joined or cut after their run"
+    for dim in result.sizes:
+        if dim not in known:
+            raise InputError(
+                f"{source}: {dim}: is no dimension of the sweep that it stores: {since}"
+            )
+    for name, expected in grid.items():
+        values = result[name] if name in result.coords else xr.DataArray(np.empty(0))
+        is_dropped = values.size == 0 and expected.size == 1  # some programs drop scalars
+        if not is_dropped and not _are_same(values.values.ravel(), expected.values.ravel()):
+            there = opening.values_text(values) if values.size else "no values"
+            stored = opening.values_text(expected.assign_attrs(values.attrs))
+            raise InputError(
+                f"{source}: {name}: {there}, where the sweep that it stores has {stored}: {since}"
+            )
+
+
+def _are_same(values: NDArray[Any], others: NDArray[Any]) -> bool:
+    """Return True if values are equal to others in any order, numbers to single precision."""
+    if values.size != others.size:
+        return False
+    if others.dtype.kind in "OU":
+        return sorted(map(str, values)) == sorted(map(str, others))
+    return np.allclose(np.sort(values), np.sort(others), rtol=1e-6, atol=0.0, equal_nan=True)
 
 
 def parse(

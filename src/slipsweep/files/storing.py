@@ -30,7 +30,7 @@ from fsspec.core import url_to_fs
 from slipsweep.errors import InputError, RunError, RunWarning
 from slipsweep.files import netcdf
 from slipsweep.files.jobs import Job
-from slipsweep.files.opening import check_zarr
+from slipsweep.files.opening import check_zarr, read_result
 from slipsweep.files.outputs import EXISTS, appear, writing
 from slipsweep.grid.chunks import Chunk, grid_chunks
 from slipsweep.grid.plans import Plan
@@ -220,9 +220,17 @@ class Chunks:
                         file[name][region] = source[name][region]
         return compressed
 
-    def finish(self, overwrite: bool) -> None:
-        """Give the output its name."""
+    def add_attributes(self, path: str, attributes: Mapping[str, str]) -> None:
+        """Add attributes to the file or store."""
+        with netCDF4.Dataset(path, "r+") as file:
+            file.setncatts(netcdf.attributes(attributes))
+
+    def finish(self, overwrite: bool, remarks: Callable[[xr.Dataset], Mapping[str, str]]) -> None:
+        """Add attributes that follow from the results, and give the output its name."""
         complete = self.completed()
+        with read_result(complete) as results:
+            attributes = remarks(results)
+        self.add_attributes(complete, attributes)
         if isinstance(self.path, Path):
             appear(Path(complete), self.path, overwrite)
         self._files.rm(self._folder, recursive=True)
@@ -291,6 +299,11 @@ class ZarrChunks(Chunks):
 
         del zarr.open_group(self.target, mode="r+").attrs["unfinished"]
         return self.target
+
+    def add_attributes(self, path: str, attributes: Mapping[str, str]) -> None:
+        import zarr
+
+        zarr.open_group(path, mode="r+").attrs.update(attributes)
 
 
 def _write_region(

@@ -25,9 +25,6 @@ from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform, peak_acceleration
 
-_SOURCE = {"source": f"slipsweep {__version__}", "references": known.REFERENCE}
-
-
 #: Results that lie on the same dimensions: what solves them (`engine.solve`, say), and its request.
 Task: TypeAlias = tuple[Callable[[engine.Request], engine.Variables], engine.Request]
 
@@ -226,7 +223,7 @@ def plan_friction_parameters(inputs: grid_inputs.Inputs, *, model: Any = "mendez
         "validity",
     )
     task = _friction_task(problem, names, coords)
-    attrs = {"title": "Friction parameters", **_SOURCE, **options.MODELS.attributes(problem.model)}
+    attrs = {"title": "Friction parameters", **_origin(problem)}
     return Plan(dict(task[1].sizes), coords, (task,), names, attrs)
 
 
@@ -306,9 +303,14 @@ def _about(problem: grid_inputs.Problem, given: Collection[str]) -> dict[str, An
     inputs = {"friction_inputs": options.friction_inputs(problem.model.name, given, {})}
     return {
         "title": title,
-        **_SOURCE,
-        **options.MODELS.attributes(problem.model),
+        **_origin(problem),
         **inputs,
         **shaking,
         **options.SOLVERS.attributes(problem.solver),
     }
+
+
+def _origin(problem: grid_inputs.Problem) -> dict[str, Any]:
+    """Return attributes for the program and the model that results come from."""
+    source = {"source": f"slipsweep {__version__}", "references": problem.model.reference}
+    return source | options.MODELS.attributes(problem.model)

@@ -7,6 +7,7 @@ from typing import ClassVar, Literal, TypeAlias
 from slipsweep.errors import InputError
 from slipsweep.model.choices import Choice, Family, option
 from slipsweep.model.parameters import GRAVITY
+from slipsweep.model.variables import NEWMARK_REFERENCE, REFERENCE
 
 Rule: TypeAlias = Literal["rectangle", "trapezoid", "simpson"]
 
@@ -48,6 +49,7 @@ class Mendez(Choice):
     """
 
     name: ClassVar[str] = "mendez"
+    reference: ClassVar[str] = REFERENCE
     rise: Literal["monotone", "literal"] = option("rise of the block's acceleration", "monotone")
     recoupling: Literal["eq12", "integrate"] = option(
         "rule by which the block re-sticks after the base has reversed", "eq12"
@@ -86,6 +88,7 @@ class Newmark(Choice):
     """
 
     name: ClassVar[str] = "newmark"
+    reference: ClassVar[str] = NEWMARK_REFERENCE
     g: float = option("gravity, m/s²", GRAVITY)
 
 

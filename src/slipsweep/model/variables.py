@@ -13,6 +13,10 @@ REFERENCE = (
     "frictional interfaces under harmonic loading, Soil Dynamics and Earthquake Engineering "
     "32, 152-158, https://doi.org/10.1016/j.soildyn.2011.08.007"
 )
+NEWMARK_REFERENCE = (
+    "N. M. Newmark (1965), Effects of earthquakes on dams and embankments, Géotechnique 15, "
+    "139-160, https://doi.org/10.1680/geot.1965.15.2.139"
+)
 
 
 class SlidingMode(IntEnum):
@@ -53,6 +57,9 @@ FLAG_KIND_TEXT: dict[FlagKind, str] = {
     FlagKind.CAUTION: "an assumption of the model is violated",
     FlagKind.NOTE: "no assumption is violated; a special rule or an estimate was used",
 }
+
+#: What is said of cells that have lost their flags.
+UNFLAGGED_TEXT = "another program has masked or joined these cells, and left them without flags"
 
 
 class Validity(IntFlag):
