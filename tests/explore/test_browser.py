@@ -29,7 +29,7 @@ from slipsweep.model.variables import (
     flags_of,
 )
 from tests.support.browser import FOUND, chosen, move, point, show, text_of, wait_for
-from tests.support.pages import AXES, SUITE
+from tests.support.pages import AXES, SUITE, contents
 
 
 def test_page_loads_without_errors_and_without_network(opened: Any) -> None:
@@ -156,6 +156,18 @@ def test_history_is_of_the_very_cell_that_is_named(opened: Any) -> None:
     ):
         assert float(exact.max()) > 0.0
         np.testing.assert_allclose(values, exact, rtol=0, atol=float(exact.max()) / 30_000)
+    shown = opened.execute_script(
+        FOUND + "const d = found('history').data, r = found('accelerations_range');"
+        "return [[...d.ground], [...d.block], r.start, r.end, found('accelerations_g').end]"
+    )
+    for values, exact in (
+        (shown[0], expected.ground_acceleration),
+        (shown[1], expected.block_acceleration),
+    ):
+        differs = np.abs(np.array(values) - exact.values) > float(np.abs(exact).max()) / 30_000
+        assert np.count_nonzero(differs) <= 3  # where braking begins, once a cycle
+    most = 1.05 * np.abs(shown[:2]).max()
+    assert shown[2:] == pytest.approx([-most, most, most / 9.81], rel=1e-12)
     summary = text_of(opened, "history-summary")
     (fastest,) = re.findall(r"Largest velocity ([\d.]+) m/s;", summary)
     assert float(fastest) == pytest.approx(max(drawn[1]), rel=1e-4)
@@ -230,6 +242,21 @@ def test_the_other_layer_is_newmarks_block(opened: Any, result: Path) -> None:
         np.testing.assert_allclose(seen[np.ix_(rows, columns)], expected, rtol=1e-6)
     finally:
         show(opened, result.with_suffix(".html"))
+
+
+def test_cells_with_a_history_are_marked_where_they_are(opened: Any, written: Path) -> None:
+    move(opened, 1, 0)
+    meta, arrays = contents(written)
+    store = meta["histories"]["keep"]
+    there = np.isfinite(arrays["history_scale"][..., 0])
+    rows = there[store["theta"].index(1), store["mu_s"].index(0)]
+    amplitudes = np.array(AXES[2])[store["amplitude"]][rows]
+    expected = {(float(f), float(a)) for f in AXES[3] for a in amplitudes}
+    drawn = opened.execute_script(
+        FOUND + "const d = found('held').data; return [[...d.x], [...d.y]]"
+    )
+    points = np.array(sorted(zip(*drawn, strict=True)))
+    np.testing.assert_allclose(points, sorted(expected), rtol=1e-12)
 
 
 def test_zoom_shows_a_part_about_the_chosen_cell(opened: Any) -> None:

@@ -49,6 +49,11 @@ def test_page_holds_the_dataset(result: Path, written: Path) -> None:
     )
     assert meta["unsound"] == int(CAUTIONS | VALUELESS)
     assert "All 2,484 cells of the file are in this page." in written.read_text()
+    # the slope that is statically unstable has histories of no cell
+    kept = meta["histories"]["keep"]
+    histories = " × ".join(f"{len(indices)} {dim}" for dim, indices in kept.items())
+    note = f"the first 3 of 4 cycles, 64 points a cycle, computed event by event for {histories}"
+    assert note in written.read_text()
 
 
 def test_histories_are_those_of_simulate(written: Path) -> None:
@@ -198,3 +203,7 @@ def test_records_and_uncertain_inputs(tmp_path: Path, drawn: bool) -> None:
                 arrays[name].reshape([data.sizes[d] for d in order]), expected, rtol=4e-7
             )
             assert np.nanmax(expected) > 0.0
+            # u grows with the square of the time scale: stored at one of them
+            if name != "exceedance_probability":
+                length = meta["arrays"][name]["shape"][list(axes_of(meta)).index("time_scale")]
+                assert length == 1

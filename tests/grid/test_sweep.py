@@ -230,6 +230,37 @@ def test_what_is_given_is_a_coordinate_and_no_result() -> None:
     assert result.delta_mu.item() == 0.1
 
 
+@pytest.mark.parametrize("shaking", ["wave", "record"])
+def test_newmarks_displacement_beside_ours_is_that_of_newmarks_block(shaking: str) -> None:
+    """With the same yield acceleration, at every frequency or time scale."""
+    given: dict[str, Any] = {"theta": 5.0, "mu_s": [0.3, 0.4], "yield_acceleration": 1.0}
+    if shaking == "wave":
+        given |= {"amplitude": [2.0, 5.0], "frequency": [0.5, 1.0, 3.0]}
+    else:
+        values = 4.0 * np.sin(np.arange(200) * 0.1)
+        record = slipsweep.Record.sampled(values, 0.02)
+        given |= {"excitation": record, "time_scale": [0.5, 1.0, 3.0], "scale": [1.0, 2.0]}
+    names = ["permanent_displacement", "newmark_displacement"]
+    found = slipsweep.sweep(**given, variables=names)
+    expected = slipsweep.sweep(**given, model="newmark").permanent_displacement
+    np.testing.assert_allclose(found.newmark_displacement, expected, rtol=1e-13)
+    clock = "frequency" if shaking == "wave" else "time_scale"
+    assert (expected.diff(clock) != 0.0).all()
+    assert (found.permanent_displacement != expected).any()
+
+
+def test_a_yield_coefficient_is_of_the_models_own_gravity() -> None:
+    moon = slipsweep.Newmark(g=1.62)
+    shaking: dict[str, Any] = {"amplitude": [0.3, 1.0], "frequency": 1.0, "model": moon}
+    found = slipsweep.sweep(yield_coefficient=[0.05, 0.1], **shaking)
+    expected = slipsweep.sweep(0.0, 0.5, yield_acceleration=[0.081, 0.162], **shaking)
+    np.testing.assert_allclose(
+        found.permanent_displacement.transpose("yield_coefficient", "amplitude"),
+        expected.permanent_displacement.transpose("yield_acceleration", "amplitude"),
+        rtol=1e-13,
+    )
+
+
 def test_nothing_unasked_is_computed(cells_solved: list[int]) -> None:
     result = slipsweep.sweep(**AXES, variables=FRICTION_PARAMETERS)
     assert tuple(result.data_vars) == tuple(name for name in RESULTS if name in FRICTION_PARAMETERS)
