@@ -54,9 +54,13 @@ def test_as_many_threads_as_cores() -> None:
     assert count_in_process() == cores
 
 
-@pytest.mark.parametrize("name", ["NUMBA_NUM_THREADS", "OMP_NUM_THREADS"])
-def test_environment_limits_threads(name: str) -> None:
-    assert count_in_process(**{name: "1"}) == 1
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("NUMBA_NUM_THREADS", "1"), ("OMP_NUM_THREADS", "1"), ("OMP_NUM_THREADS", "1,4")],
+)
+def test_environment_limits_threads(name: str, value: str) -> None:
+    """Of a list, a number for each level of nesting, the first counts."""
+    assert count_in_process(**{name: value}) == 1
 
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="no affinity here")
