@@ -234,7 +234,8 @@ def _fill_tile(
     cells = np.full((*shape, len(names)), math.nan).view(solver.cell)[..., 0]
     with np.errstate(all="ignore"):  # results that overflow are refused below
         for name, values in cell_inputs(problem, inputs).items():
-            cells[name] = values
+            if name in names:
+                cells[name] = values
         found = np.empty((1 + max(solver.rows.values()), cells.size))
         solver.solve(cells.reshape(-1), found)
         validity = found[solver.rows["validity"]].reshape(shape).astype(np.int16)
