@@ -14,7 +14,7 @@ from slipsweep.kernels.grid import CELL, find_parameters
 from slipsweep.kernels.record import solve_record
 from slipsweep.kernels.sine.solve import solve_sine
 from slipsweep.kernels.waves import solve_waves
-from slipsweep.model.options import Mendez, Newmark, Step
+from slipsweep.model.options import Mendez, Newmark, Step, slides_both_ways
 from slipsweep.model.variables import FRICTION_PARAMETERS
 from slipsweep.motion import cutting
 from slipsweep.motion.paths import Path
@@ -108,6 +108,7 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
 
 def newmark_solver(problem: Problem, options: physics.Options, polarity: float) -> Solver:
     """Return the solver of Newmark's block: its own kernel, or under a plain sine the batches."""
+    assert not isinstance(problem.excitation, Suite)
     path = path_under(problem.excitation, polarity)
 
     def solve(cells: np.ndarray, results: np.ndarray) -> None:
@@ -126,7 +127,7 @@ def newmark_solver(problem: Problem, options: physics.Options, polarity: float) 
         results[:, left] = solved[: results.shape[0]]
 
     # a batch solves several cells at once, the kernel one by one
-    if is_plain_sine(problem.excitation):
+    if is_plain_sine(problem.excitation) and not slides_both_ways(problem.model):
         return Solver(solve_in_batches, ROWS)
     return Solver(solve, NEWMARK_ROWS, newmark.NEWMARK_CELL)
 
@@ -145,6 +146,7 @@ def stepper_of(
     assert isinstance(problem.solver, Step)
     rule = RULES[problem.solver.rule]
     count = problem.solver.steps_per_cycle
+    assert not isinstance(problem.excitation, Suite)
     is_record = isinstance(problem.excitation, Record)
     on_piece = math.ceil(count / STEPS_PER_SAMPLE) if is_record else 0
     path = path_under(problem.excitation, polarity)
@@ -153,6 +155,9 @@ def stepper_of(
     def solve(cells: np.ndarray, history: step.History, results: np.ndarray) -> None:
         blocks = step.blocks_of(rule, count, on_piece)
         step.solve_steps(cells, options, path, blocks, steps, history, results)
+        if slides_both_ways(problem.model):  # a displacement upslope is no caution there
+            validity = results[ROWS["validity"]].astype(np.int64)
+            results[ROWS["validity"]] = validity & ~physics.UPSLOPE
 
     return solve
 
@@ -169,7 +174,7 @@ def cost_of(problem: Problem) -> int:
     if isinstance(motion, Waveform):
         if steps:
             return 1 + steps // 16
-        return 1 if is_plain_sine(motion) else 16
+        return 1 if is_plain_sine(motion) and not slides_both_ways(problem.model) else 16
     records = motion if isinstance(motion, Suite) else (motion,)
     samples = max(record.times.size for record in records)
     return max(64, samples // 8) * math.ceil(max(steps, 1) / STEPS_PER_SAMPLE)
