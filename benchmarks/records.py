@@ -64,7 +64,7 @@ def exact_displacement(motion: Any, g: float, ky: float = KY, factor: float = 1.
     """Newmark's block by slipsweep, m."""
     record = Record.sampled(factor * motion.accel * g, motion.dt)
     return float(
-        sweep(yield_coefficient=ky, model=Newmark(g), excitation=record).permanent_displacement
+        sweep(yield_coefficient=ky, model=Newmark(g=g), excitation=record).permanent_displacement
     )
 
 

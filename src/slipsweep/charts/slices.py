@@ -14,6 +14,7 @@ from slipsweep.charts.style import SHOWN, Options, check_attributes
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.motions import read_embedded
 from slipsweep.files.selection import At, Place, axis_labels, between, find
+from slipsweep.model.options import check_one_way
 from slipsweep.model.variables import PARAMETERS, STATISTIC_COORDINATES, STATISTICS
 
 #: Dimensions whose places have names, and no order.
@@ -53,6 +54,7 @@ class Result:
         self.name = str(name)
         self.attrs = data.attrs
         self.sort = _sort(data)
+        check_one_way(f"{name}: charts and explore", data.attrs.get("sliding"))
         if self.sort in OTHER_SORTS and self.sort != "limit":
             self.data = data
             self.variables = []

@@ -34,6 +34,7 @@ _INPUTS = tuple(name for name in variables.PARAMETERS if name != "polarity")
 _MODEL_PARAMETERS = (
     "yield_acceleration",
     "yield_coefficient",
+    "upslope_yield_acceleration",
     "decay_rate",
     "delta_mu",
     "minimum_friction",

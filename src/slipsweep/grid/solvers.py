@@ -8,13 +8,14 @@ import numpy as np
 
 from slipsweep.grid.inputs import Problem
 from slipsweep.kernels import block as physics
-from slipsweep.kernels import step
+from slipsweep.kernels import newmark, step
 from slipsweep.kernels.grid import CELL, find_parameters
 from slipsweep.kernels.sine.solve import solve_sine
 from slipsweep.kernels.walk import solve_walk, workspace_of
-from slipsweep.model.options import Mendez, Step
+from slipsweep.model.options import Mendez, Newmark, Step, slides_both_ways
 from slipsweep.model.variables import FRICTION_PARAMETERS
 from slipsweep.motion import cutting
+from slipsweep.motion.paths import Path
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import Sine, Waveform
@@ -31,6 +32,9 @@ _NAMES = {"displacement": "permanent_displacement", "peak_velocity": "peak_relat
 ROWS = {_NAMES.get(field, field): row for row, field in enumerate(physics.Motion._fields)}
 # Newmark's block is solved as a problem of its own
 ROWS["newmark_displacement"] = ROWS["permanent_displacement"]
+
+NEWMARK_ROWS = {name: row for row, name in enumerate(newmark.RESULTS)}
+NEWMARK_ROWS["newmark_displacement"] = NEWMARK_ROWS["permanent_displacement"]
 
 #: The same of `find_parameters`.
 _PARAMETER_ROWS = {
@@ -70,6 +74,8 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
     """What solves the cells of a problem that one motion shakes."""
     motion = problem.excitation
     options = options_of(problem, wants_peak)
+    if isinstance(problem.model, Newmark) and not isinstance(problem.solver, Step):
+        return newmark_solver(problem, options, polarity)
 
     def under_wave(cells: np.ndarray, results: np.ndarray) -> None:
         path = cutting.path_of_waveform(motion)
@@ -97,6 +103,39 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
     return Solver(under_sine if is_plain_sine(motion) else under_wave, ROWS)
 
 
+def newmark_solver(problem: Problem, options: physics.Options, polarity: float) -> Solver:
+    """Return the solver of Newmark's block: its own kernel, or under a plain sine the batches."""
+    assert not isinstance(problem.excitation, Suite)
+    path = path_under(problem.excitation, polarity)
+
+    def solve(cells: np.ndarray, results: np.ndarray) -> None:
+        blocks = np.zeros(1, newmark.BLOCK)
+        newmark.solve_newmark(cells, options.g, options.wants_peak, path, blocks, results)
+
+    def solve_in_batches(cells: np.ndarray, results: np.ndarray) -> None:
+        if not solve_sine(cells, options, results):
+            return
+        left = np.flatnonzero(results[ROWS["validity"]] == physics.UNSOLVED)
+        others = np.full(left.size, math.nan, newmark.NEWMARK_CELL)
+        for name in newmark.DOWNSLOPE_FIELDS:
+            others[name] = cells[name][left]
+        solved = np.empty((len(newmark.RESULTS), left.size))
+        solve(others, solved)
+        results[:, left] = solved[: results.shape[0]]
+
+    # a batch solves several cells at once, the kernel one by one
+    if is_plain_sine(problem.excitation) and not slides_both_ways(problem.model):
+        return Solver(solve_in_batches, ROWS)
+    return Solver(solve, NEWMARK_ROWS, newmark.NEWMARK_CELL)
+
+
+def path_under(motion: Waveform | Record, polarity: float) -> Path:
+    """Return the path of the base under a waveform or a record."""
+    if isinstance(motion, Record):
+        return cutting.path_of_record(motion, polarity)
+    return cutting.path_of_waveform(motion)
+
+
 def stepper_of(
     problem: Problem, options: physics.Options, polarity: float
 ) -> Callable[[np.ndarray, step.History, np.ndarray], Any]:
@@ -104,17 +143,18 @@ def stepper_of(
     assert isinstance(problem.solver, Step)
     rule = RULES[problem.solver.rule]
     count = problem.solver.steps_per_cycle
-    on_piece = 0
-    if isinstance(problem.excitation, Record):
-        path = cutting.path_of_record(problem.excitation, polarity)
-        on_piece = math.ceil(count / STEPS_PER_SAMPLE)
-    else:
-        path = cutting.path_of_waveform(problem.excitation)
+    assert not isinstance(problem.excitation, Suite)
+    is_record = isinstance(problem.excitation, Record)
+    on_piece = math.ceil(count / STEPS_PER_SAMPLE) if is_record else 0
+    path = path_under(problem.excitation, polarity)
     steps = step.steps_of(path, rule, count, on_piece)
 
     def solve(cells: np.ndarray, history: step.History, results: np.ndarray) -> None:
         blocks = step.blocks_of(rule, count, on_piece)
         step.solve_steps(cells, options, path, blocks, steps, history, results)
+        if slides_both_ways(problem.model):  # a displacement upslope is no caution there
+            validity = results[ROWS["validity"]].astype(np.int64)
+            results[ROWS["validity"]] = validity & ~physics.UPSLOPE
 
     return solve
 
@@ -131,7 +171,7 @@ def cost_of(problem: Problem) -> int:
     if isinstance(motion, Waveform):
         if steps:
             return 1 + steps // 16
-        return 1 if is_plain_sine(motion) else 16
+        return 1 if is_plain_sine(motion) and not slides_both_ways(problem.model) else 16
     records = motion if isinstance(motion, Suite) else (motion,)
     samples = max(record.times.size for record in records)
     return max(64, samples // 8) * math.ceil(max(steps, 1) / STEPS_PER_SAMPLE)

@@ -1111,7 +1111,11 @@ def solve_cell(
     is_record = block.steps_on_piece > 0
     mode = block.mode
     peak = block.amplitude * (max(path.highest, -path.lowest) if is_record else 1.0)
-    if block.validity & NO_VALUE == 0 and block.amplitude * path.highest > block.yield_acceleration:
+    slides = (
+        block.amplitude * path.highest > block.yield_acceleration
+        or block.amplitude * -path.lowest > block.upslope_yield_acceleration
+    )
+    if block.validity & NO_VALUE == 0 and slides:
         if not is_record and yield_governs_wave(law, block, path):
             block.validity = flags.without_estimates(block.validity | flags.YIELD_GOVERNS)
         walk_all(law, block, cell, options, path, steps, history)

@@ -59,10 +59,13 @@ class Mendez(Choice):
 
 @dataclass(frozen=True)
 class Newmark(Choice):
-    """Newmark's rigid block [1]_: its acceleration is Üy while it slides, and the base's while it does not.
+    """Newmark's rigid block [1]_: its acceleration is Üy while it slides, the base's while it rests.
 
     Parameters
     ----------
+    sliding : {"downslope", "both"}
+        Directions in which it slides.  With "both" its acceleration is −Üy,up while it slides
+        upslope (`upslope_yield_acceleration`); displacements may then be negative.
     g : float
         Gravity, m/s².
 
@@ -84,11 +87,14 @@ class Newmark(Choice):
     --------
     >>> import slipsweep
     >>> slipsweep.Newmark()
-    Newmark(g=9.81)
+    Newmark(sliding='downslope', g=9.81)
     """
 
     name: ClassVar[str] = "newmark"
     reference: ClassVar[str] = NEWMARK_REFERENCE
+    sliding: Literal["downslope", "both"] = option(
+        "directions in which Newmark's block slides", "downslope"
+    )
     g: float = option("gravity, m/s²", GRAVITY)
 
 
@@ -151,6 +157,19 @@ class Step(Choice):
 
 
 Model = Mendez | Newmark
+
+
+def slides_both_ways(model: Model) -> bool:
+    """Return whether the model is Newmark's block that slides downslope and upslope."""
+    return isinstance(model, Newmark) and model.sliding == "both"
+
+
+def check_one_way(name: str, sliding: object) -> None:
+    """Refuse what takes displacements in one direction only."""
+    if sliding == "both":
+        raise InputError(f"{name}: not allowed with sliding = 'both', only with 'downslope'")
+
+
 Solver = Cycle | Step
 
 MODELS: Family[Model] = Family("model", "friction", (Mendez, Newmark), "mendez", "model")

@@ -225,6 +225,7 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "frequency": _cf("Hz", "excitation frequency"),
     "yield_acceleration": _cf("m s-2", "yield acceleration"),
     "yield_coefficient": _cf("1", "yield coefficient, yield acceleration over g"),
+    "upslope_yield_acceleration": _cf("m s-2", "yield acceleration upslope"),
     "decay_rate": _cf("1", "friction decay with loading rate"),
     "delta_mu": _cf("1", "friction above static"),
     "minimum_friction": _cf("1", "minimum friction coefficient"),
@@ -268,8 +269,20 @@ STRENGTHS = ("amplitude", "scale", "pgv", "arias_intensity")
 
 #: Inputs that may be drawn: all that the displacement depends on.
 DRAWN = tuple(
-    name for name in PARAMETERS if name not in ("structure_frequency", "polarity", "azimuth")
+    name
+    for name in PARAMETERS
+    if name not in ("structure_frequency", "polarity", "azimuth", "upslope_yield_acceleration")
 )
+
+#: Results of Newmark's block that slides both ways: extremes of u over time.
+EXTREMES: dict[str, dict[str, Any]] = {
+    "largest_displacement": _cf(
+        "m", "largest relative displacement over time, downslope", "validity", comment=_DIRECTION
+    ),
+    "smallest_displacement": _cf(
+        "m", "smallest relative displacement over time, downslope", "validity", comment=_DIRECTION
+    ),
+}
 
 #: Results of a sweep: attributes of the variables.
 RESULTS: dict[str, dict[str, Any]] = {
@@ -282,6 +295,7 @@ RESULTS: dict[str, dict[str, Any]] = {
     "newmark_displacement": _cf(
         "m", "permanent displacement of Newmark's block, downslope", "validity", comment=_DIRECTION
     ),
+    **EXTREMES,
     "yield_acceleration": _cf("m s-2", "yield acceleration"),
     "limiting_acceleration": _cf("m s-2", "limiting acceleration (Eq. 7)"),
     "acceleration_ratio": _cf("1", "peak ground over limiting acceleration"),
@@ -323,7 +337,7 @@ RECORD_COUNTS: dict[str, dict[str, Any]] = {
 RECORD_RESULTS: dict[str, dict[str, Any]] = {
     **{name: RESULTS[name] for name in ("permanent_displacement", "peak_relative_velocity")},
     **RECORD_COUNTS,
-    **{name: RESULTS[name] for name in ("validity", "newmark_displacement")},
+    **{name: RESULTS[name] for name in ("validity", "newmark_displacement", *EXTREMES)},
     "motion_factor": _cf("1", "factor on the recorded acceleration"),
 }
 

@@ -120,6 +120,7 @@ def simulate(
         structure_frequency=structure_frequency,
     )
     problem = grid_inputs.check_problem(excitation, model, solver)
+    options.check_one_way("simulate", getattr(problem.model, "sliding", None))
     motion = problem.excitation
     if isinstance(motion, Suite):
         one_motion = f"suite[{motion.labels[0]!r}]{'.rotated(azimuth)' if motion.has_pairs else ''}"
