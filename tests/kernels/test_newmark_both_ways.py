@@ -103,7 +103,7 @@ def test_drift_on_an_incline(downslope: float, upslope: float, drift: float) -> 
 )
 def test_triangular_pulse(share: float, displacement: float) -> None:
     """A recorded isosceles triangle of 1 s, then rest; in units of A T₀²."""
-    pulse = Record([0.0, 0.5, 1.0], [0.0, 1.0, 0.0])
+    pulse = Record.sampled([0.0, 1.0, 0.0], 0.5)
     for model in (Newmark(), BOTH):
         found = sweep(0.0, 0.1, yield_acceleration=share, excitation=pulse, model=model)
         assert float(found.permanent_displacement) == pytest.approx(displacement, abs=1e-12)

@@ -13,6 +13,7 @@ docs/numerics.md#newmarks-block
 """
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -452,8 +453,9 @@ def walk_cycles(block: np.record, path: Path, wants_peak: bool) -> float:
             left -= 1
             age += 1
             loss = abs(velocity) - abs(block.velocity)
-            if left > 0 and block.slowest > 0.0 and loss > 0.0:
-                alike = min(float(left), math.floor(block.slowest / loss))
+            slowest: Any = block.slowest  # NumPy does not type the fields of a record
+            if left > 0 and slowest > 0.0 and loss > 0.0:
+                alike = min(float(left), math.floor(slowest / loss))
                 gained = block.velocity - velocity
                 moved = block.displacement - displacement
                 block.displacement += alike * moved + 0.5 * period * gained * alike * (alike + 1.0)
