@@ -62,6 +62,7 @@ SYMBOLS = {
     "minimum_friction": "μmin",
     "structure_frequency": "fs",
     "yield_coefficient": "ky",
+    "upslope_yield_acceleration": "Üy,up",
     "scale": "scale",
     "pgv": "PGV",
     "arias_intensity": "Ia",
