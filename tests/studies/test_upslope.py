@@ -108,7 +108,7 @@ def test_nothing_is_said_where_it_is_not_known_or_not_so() -> None:
 
 
 def test_a_wave_that_drives_upslope_less_than_downslope_is_taken_by_its_trough() -> None:
-    """sin φ − 0.5 cos 2φ has the peak 1.5 and the trough −0.75: half of the peak."""
+    """sin φ − 0.5 cos 2φ has the peak 1.5 and the lowest point −0.75: half of the peak."""
     wave = slipsweep.Harmonics([1.0, 0.5], [1, 2], [0.0, -90.0])
     amplitudes = [0.5 * G, 0.7 * G]  # troughs 0.25 g and 0.35 g, μ 0.3
     result = slipsweep.sweep(0.0, 0.3, amplitudes, 2.0, excitation=wave, model="newmark")
