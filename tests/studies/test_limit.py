@@ -375,6 +375,18 @@ def test_no_limit_and_what_is_refused(shaking: Record) -> None:
         limit_amplitude(0.1, 5.0, 0.4, excitation=Record.sampled([0.0, 0.0, 0.0], 0.1))
 
 
+def test_the_search_ends_at_five_g_of_the_models_gravity() -> None:
+    """A limit between 3 and 5 g is found, one above 5 g is not reached."""
+    for g in (9.81, 1.62):
+        given: dict[str, Any] = {"frequency": 0.5, "model": slipsweep.Newmark(g=g)}
+        found = limit_amplitude(0.01, yield_coefficient=[3.5, 4.999], amplitude_steps=16, **given)
+        assert found.attrs["maximum_amplitude"] == pytest.approx(5.0 * g, rel=1e-15)
+        np.testing.assert_array_equal(
+            found.limit_status, [LimitStatus.REACHED, LimitStatus.NOT_REACHED]
+        )
+        assert 3.5 * g < found.limit_amplitude[0] < 5.0 * g
+
+
 SWEEP = """
 [model]
 friction = "newmark"

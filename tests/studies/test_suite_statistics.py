@@ -7,7 +7,8 @@ import pytest
 import xarray as xr
 
 from slipsweep import InputError, Record, Suite, Validity, suite_statistics, sweep
-from slipsweep.studies.suite_statistics import REASONS
+from slipsweep.model.variables import LimitStatus
+from slipsweep.studies.suite_statistics import REASONS, limit_quantiles
 
 UNSTABLE = Validity.STATICALLY_UNSTABLE
 UPLIFT = Validity.UPLIFT
@@ -165,3 +166,29 @@ def test_statistics_of_no_suite_are_refused(given: dict[str, Any], message: str)
     result = suite_result([[0.1, 0.2]], [[0, 0]], ("mu_s", "motion"))
     with pytest.raises(InputError, match=message):
         suite_statistics(result, **given)
+
+
+def test_limits_of_motions_without_a_value_are_left_out_of_their_quantiles() -> None:
+    """Those that are not reached are above all others; without a value at any amplitude there is no limit."""
+    nan = np.nan
+    reached, beyond, invalid = LimitStatus.REACHED, LimitStatus.NOT_REACHED, LimitStatus.INVALID
+    values = [[1.0, 2.0, 3.0, nan, nan], [1.0, nan, nan, nan, nan], [nan, nan, nan, nan, nan]]
+    status = [
+        [reached, LimitStatus.AT_JUMP, LimitStatus.AFTER_GAP, beyond, invalid],
+        [reached, beyond, beyond, invalid, invalid],
+        [invalid] * 5,
+    ]
+    limits = xr.Dataset(
+        {
+            "limit_amplitude": (("mu_s", "motion"), values),
+            "limit_status": (("mu_s", "motion"), np.array(status, np.int8)),
+        }
+    )
+    found = limit_quantiles(limits)
+    np.testing.assert_array_equal(found["quantile"], [0.16, 0.5, 0.84])
+    # of 1, 2, 3 and one above: between the third and the fourth there is no number
+    expected = [[1.48, 2.5, np.inf], [np.inf] * 3, [nan] * 3]
+    np.testing.assert_allclose(found.limit_quantile.transpose("mu_s", "quantile"), expected)
+    np.testing.assert_array_equal(found.value_count, [4, 3, 0])
+    np.testing.assert_array_equal(found.not_reached_count, [1, 2, 0])
+    assert found.limit_quantile.attrs["units"] == "m s-2"

@@ -296,6 +296,30 @@ def test_correlation_of_normal_scores() -> None:
         )
 
 
+def test_samples_that_lose_contact_are_no_part_of_a_probability() -> None:
+    """Unlike statically unstable ones: P(u > d) = (above + unstable) / (with a value + unstable)."""
+    uncertain = {
+        "mu_s": {"distribution": "uniform", "loc": 0.3, "scale": 0.4},
+        "amplitude": {"distribution": "uniform", "loc": 2.0, "scale": 24.0},
+    }
+    found = slipsweep.sample(
+        25.0, frequency=1.0, uncertain=uncertain, samples=256, thresholds=[0.05, 0.5]
+    )
+    draws: dict[str, Any] = {
+        name: xr.DataArray(values, dims="draw")
+        for name, values in drawn(uncertain, samples=256).items()
+    }
+    swept = slipsweep.sweep(25.0, frequency=1.0, **draws)
+    flags = slipsweep.flags(swept)
+    unstable = int(flags.statically_unstable.sum())
+    valued = int(swept.permanent_displacement.notnull().sum())
+    assert min(unstable, valued, 256 - unstable - valued) > 20
+    for threshold in (0.05, 0.5):
+        above = int((swept.permanent_displacement > threshold).sum())
+        probability = found.exceedance_probability.sel(threshold=threshold)
+        assert probability == pytest.approx((above + unstable) / (valued + unstable), rel=1e-14)
+
+
 def test_statically_unstable_samples_exceed_every_threshold() -> None:
     """A block that slides under its own weight (μs ≤ tan θ) has no displacement by the model."""
     friction = stats.lognorm(0.2, scale=0.3)
