@@ -34,7 +34,7 @@ def cycle_errors(found: list[Point]) -> str:
             rows.append(
                 [point.regime.replace("_", "–"), *errors, number(point.seconds_per_cell * 1e9)]
             )
-    return table(["regime", "median", "95 %", "worst", "ns a cell and core"], rows)
+    return table(["regime", "median", "95 %", "worst", "core time per cell, ns"], rows)
 
 
 def newmark() -> str:

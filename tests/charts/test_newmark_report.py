@@ -1,5 +1,7 @@
 """The report of a result of Newmark's block says nothing of the paper, which it does not compute."""
 
+from typing import Any
+
 import pytest
 import xarray as xr
 
@@ -12,7 +14,12 @@ PAPER = ("Mendez", "one interface", "shaking-table", "not_recoupled", "near_mode
 
 @pytest.fixture(scope="module")
 def results() -> dict[str, xr.Dataset]:
-    axes = {"theta": [0, 10], "mu_s": 0.4, "amplitude": [2.0, 4.0, 8.0], "frequency": [1.0, 2.0]}
+    axes: dict[str, Any] = {
+        "theta": [0, 10],
+        "mu_s": 0.4,
+        "amplitude": [2.0, 4.0, 8.0],
+        "frequency": [1.0, 2.0],
+    }
     return {model: slipsweep.sweep(**axes, model=model) for model in ("mendez", "newmark")}
 
 

@@ -2,6 +2,7 @@
 
 import contextlib
 import csv
+import io
 import os
 import re
 import resource
@@ -236,6 +237,24 @@ def test_settings_of_other_programs_do_no_harm(small: Path) -> None:
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert (small / "limit.png").exists()
+
+
+def test_letters_that_a_terminal_cannot_print_are_spelled(small: Path) -> None:
+    command(small, "run", "small.toml")
+    printed = []
+    for encoding in ("ascii", "latin-1", "utf-8"):
+        written = io.BytesIO()
+        stream = io.TextIOWrapper(written, encoding, write_through=True)
+        with contextlib.redirect_stdout(stream), contextlib.chdir(small):
+            assert cli.main(["info", "small.nc"]) == 0
+        printed.append(written.getvalue().decode(encoding))
+    inputs = [re.findall("friction_inputs: (.*)\n", text)[0] for text in printed]
+    assert inputs == [
+        "Uy by Coulomb, lambda by Eq. 6, Deltamu by Eqs. 10-11: estimated",
+        "Üy by Coulomb, lambda by Eq. 6, Deltamu by Eqs. 10-11: estimated",
+        "Üy by Coulomb, λ by Eq. 6, Δμ by Eqs. 10–11: estimated",
+    ]
+    assert "\\" not in printed[0]
 
 
 #: A process whose user has no account.

@@ -33,7 +33,7 @@ def told(*arguments: object, status: int = 0) -> str:
         (
             ("--amplitude", "4", "--theta", "300 arcmin", "--frequency", "120 rpm"),
             ("--amplitude", "4"),
-            "theta 5 degree, amplitude 4 m/s2",
+            "theta 5 degree, mu_s 0.38, amplitude 4 m/s2",
         ),
         (
             ("--amplitude", "4", "--yield-acceleration", "0.1g"),
@@ -52,9 +52,18 @@ def test_simulate_takes_units_and_says_what_it_took(
 ) -> None:
     first, other = (told(*BLOCK, *given) for given in (typed, same))
     assert first == other
-    assert "taken as                theta 5 degree, " in first
+    assert "taken as                theta 5 degree, mu_s 0.38, " in first
     assert echo in first
     assert "frequency 2 Hz" in first
+
+
+def test_simulate_says_what_it_took_of_a_record(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("time (s),acceleration (g)\n0,0\n1,0.5\n2,-0.5\n3,0\n")
+    given = ("simulate", "--theta", "5", "--phi", "21", "--record", tmp_path / "a.csv")
+    taken = "taken as                theta 5 degree, mu_s 0.383864, phi 21 degree, scale {}, "
+    assert taken.format("1") + "time scale 1, polarity 1\n" in told(*given)
+    typed = ("--scale", "2", "--polarity", "-1", "--time-scale", "0.5")
+    assert taken.format("2") + "time scale 0.5, polarity -1\n" in told(*given, *typed)
 
 
 @pytest.mark.parametrize(

@@ -5,12 +5,13 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from slipsweep.cli import main
 from slipsweep.errors import InputError, RunError
-from slipsweep.files import outputs
+from slipsweep.files import outputs, running, storing
 from tests.support.no_locks import refusing_locks
 
 SWEEP = """
@@ -115,6 +116,63 @@ def test_where_the_file_system_has_no_locks_the_setting_is_named_that_goes_witho
     assert not (folder / "n.nc").exists()
     lines = ["run a.toml -o n.nc -q", "export n.nc -o n.csv -q"]
     assert ended(lines, HDF5_USE_FILE_LOCKING="FALSE") == ("0 0\n", [])
+
+
+@pytest.mark.parametrize("output", ["a.nc", "a.zarr", "a.csv"])
+def test_overwrite_through_a_link_replaces_what_it_points_to(
+    folder: Path, tmp_path: Path, output: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(running, "CHUNK_CELLS", 2)  # in chunks
+    Path("elsewhere").mkdir()
+    link = Path(output)
+    target = Path("elsewhere", f"real{link.suffix}")
+    command = ["export", str(folder / "a.nc")] if link.suffix == ".csv" else []
+    command = [*(command or ["run", str(folder / "a.toml")]), "-q", "-o"]
+    assert main([*command, str(target)]) == 0
+    before = target.stat()
+    link.symlink_to(target)
+    assert main([*command, output]) == 2  # it exists
+    assert main([*command, output, "--overwrite"]) == 0
+    assert link.readlink() == target
+    assert target.stat().st_ino != before.st_ino
+    assert {path.name for path in tmp_path.iterdir()} == {"elsewhere", output}
+    assert [path.name for path in Path("elsewhere").iterdir()] == [target.name]
+    link.unlink()
+    link.symlink_to("nowhere/real.nc")
+    assert main([*command, output, "--overwrite"]) == 2
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_an_output_without_a_name_is_refused(
+    folder: Path, command: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(folder)
+    before = {path.name for path in folder.iterdir()}
+    assert "--output: must be the name of a file" in refused(capfd, *command.split(), "")
+    assert {path.name for path in folder.iterdir()} == before
+
+
+def test_a_result_that_is_not_finished_says_so(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(running, "CHUNK_CELLS", 2)
+    write = storing.Chunks.write
+
+    def interrupted(chunks: storing.Chunks, number: int, *results: Any) -> None:
+        if number == 2:
+            raise KeyboardInterrupt
+        write(chunks, number, *results)
+
+    monkeypatch.setattr(storing.Chunks, "write", interrupted)
+    assert main(["run", str(folder / "a.toml"), "-o", "b.nc", "-q"]) == 130
+    for name in ("b.nc", "b.nc.part"):
+        text = refused(capfd, "info", name)
+        assert f"{name}: is not finished: 2 of its chunks are in b.nc.part" in text
+        assert "run its sweep again with --resume" in text
+    Path("b.nc").write_bytes((folder / "a.nc").read_bytes())
+    assert main(["info", "b.nc"]) == 0  # an earlier one is there
 
 
 def test_a_folder_that_is_no_store_is_kept(folder: Path, tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ import typer
 from typer.core import TyperGroup
 
 from slipsweep._version import __version__
-from slipsweep.cli import calibrate, chart, hazard, info, limit, run, simulate
+from slipsweep.cli import calibrate, chart, hazard, info, letters, limit, run, simulate
 from slipsweep.cli.common import echo
 from slipsweep.cli.options import app
 from slipsweep.errors import InputError, RunError, RunWarning
@@ -103,7 +103,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.environ["HOME"] = os.devnull
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="backslashreplace")  # an alphabet without λ fails no command
+            stream.reconfigure(errors=letters.SPELL)  # an alphabet without λ fails no command
     words = list(sys.argv[1:] if arguments is None else arguments)
     with warnings.catch_warnings():
         warnings.showwarning = _show_warning

@@ -7,8 +7,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
-
 from slipsweep.cli.options import Large, displacements
 from slipsweep.errors import InputError
 from slipsweep.files import outputs
@@ -140,7 +138,8 @@ def echo(*texts: object, err: bool = False) -> None:
         shown = (
             c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text
         )
-        typer.echo("".join(shown), err=err)
+        # typer's would write UTF-8 to a terminal that has ASCII only
+        print("".join(shown), file=sys.stderr if err else sys.stdout, flush=True)
 
 
 def range_text(name: str, ends: Sequence[float], g: float) -> str:

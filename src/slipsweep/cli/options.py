@@ -156,6 +156,7 @@ def command(task: str, *examples: str) -> Callable[[Callable[..., None]], Callab
     def add(function: Callable[..., None]) -> Callable[..., None]:
         @functools.wraps(function, assigned=("__module__", "__name__", "__doc__"))
         def run(**typed: Any) -> None:
+            _check_named(typed.get("output"))
             function(**{name: _made(typed, choice) for name, choice in choices.items()}, **typed)
 
         given = inspect.signature(function).parameters
@@ -172,6 +173,13 @@ def command(task: str, *examples: str) -> Callable[[Callable[..., None]], Callab
         return function
 
     return add
+
+
+def _check_named(output: Any) -> None:
+    """Refuse outputs without a name."""
+    for path in output if isinstance(output, list) else [output]:
+        if path is not None and str(path) in ("", "."):
+            raise InputError("--output: must be the name of a file; is empty or the current folder")
 
 
 def _made(given: dict[str, Any], choice: Family[Any] | type[Any]) -> Any:

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from slipsweep.cli import common, options
 from slipsweep.cli.common import echo
@@ -14,6 +14,9 @@ from slipsweep.model import variables
 from slipsweep.model.options import MODELS, Model
 from slipsweep.motion.reading import Reading
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -95,10 +98,6 @@ def simulate(
         endings=(".nc", ".csv", *common.FIGURES),
     )
     with_unit = options.in_own_units(vars(typed), model.g)
-    taken = (
-        (name, common.range_text(name, (value,), model.g)) for name, value in with_unit.items()
-    )
-    taken_as = ", ".join(f"{name.replace('_', ' ')} {text}" for name, text in taken)
     for name in reading if record is None else ():
         raise InputError(
             f"{options.option_name(name)}: only with --record, the file of a recorded motion"
@@ -120,6 +119,7 @@ def simulate(
         "excitation": recorded or excitation or WAVEFORMS.default,
     }
     table = simulated(**given, model=model, points_per_cycle=points)
+    taken_as = _taken_as(table, model.g)
     validity = variables.Validity(table["validity"].item())
     if flags := validity & variables.VALUELESS:
         why = "; ".join(f"{(flag.name or '').lower()}: {flag.text}" for flag in flags)
@@ -162,3 +162,14 @@ def simulate(
     if common.UNSOUND in table.attrs:
         echo(f"{common.UNSOUND:<24}{table.attrs[common.UNSOUND]}")
     echo(f"taken as                {taken_as}", *paths)
+
+
+def _taken_as(table: "xr.Dataset", g: float) -> str:
+    """Parameters of a time history with their units, also those that were not typed."""
+    texts = (
+        f"{name if name == 'mu_s' else name.replace('_', ' ')} "
+        f"{common.range_text(name, [table[name].item()], g)}"
+        for name in variables.PARAMETERS
+        if name in table.coords and table[name].ndim == 0
+    )
+    return ", ".join(texts)

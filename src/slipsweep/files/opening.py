@@ -157,6 +157,13 @@ def _open(path: str | os.PathLike[str]) -> xr.Dataset:
             (*known.PARAMETERS, *known.MOTION_COORDINATES, *_RESULTS, *table.variables)
         )
         return table[[name for name in order if name in table.variables]]
+    parts = place if place.suffix == ".part" else place.with_name(f"{place.name}.part")
+    if (parts / "identity.json").is_file() and (parts == place or not place.exists()):
+        chunks = sum(1 for chunk in parts.glob("*.chunk"))
+        raise InputError(
+            f"{path}: is not finished: {chunks} of its chunks are in {parts}; "
+            "run its sweep again with --resume"
+        )
     if not place.exists():
         raise InputError(f"{path}: no such file")
     if not place.is_file():

@@ -22,7 +22,7 @@ from slipsweep.errors import InputError, RunError, check_extra
 from slipsweep.files import netcdf
 from slipsweep.files.jobs import RUN, Job
 from slipsweep.files.opening import check_zarr, read_result
-from slipsweep.files.outputs import check_outputs, complete_or_absent
+from slipsweep.files.outputs import check_outputs, complete_or_absent, real_path
 from slipsweep.files.spec import check_grid, named
 from slipsweep.files.storing import Chunks, Place, ZarrChunks
 from slipsweep.grid.chunks import CHUNK_CELLS, chunk_lengths
@@ -102,6 +102,7 @@ def run(
         check_zarr(path)
     if isinstance(path, Path):
         check_outputs([path], overwrite or resume, reads=job.spec.files)
+        path = real_path(path)
     if resume and (complete := _complete(job, path)) is not None:
         return Report(path, tally_of(complete), found=True)
     processes = workers or (64 if scheduler else 0)

@@ -458,6 +458,8 @@ def _output(table: _Table, has_statistics: bool) -> Output:
     for name in ("path", "title"):
         if not isinstance(table.get(name, ""), str):
             raise InputError(f"output.{name} = {units.show(table[name])}: must be a text")
+    if table.get("path") == "":
+        raise InputError('output.path = "": must be the name of a file')
     found = Output(**table)
     parameters.check_choice("output.dtype", found.dtype, ("float64", "float32"))
     parameters.check_whole("output.compression", found.compression, 0, 9)
