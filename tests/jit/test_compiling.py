@@ -105,6 +105,12 @@ def process(
     return done
 
 
+def limited() -> None:
+    import resource  # which Windows does not have
+
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1_000, 1_000))
+
+
 def run(code: str, env: dict[str, str], *arguments: str) -> str:
     done = process(code, env, *arguments)
     assert not done.stderr
@@ -170,6 +176,7 @@ def test_kernels_are_kept_where_the_file_system_has_no_locks(tmp_path: Path, err
     [
         ("no home", ": /dev/null"),
         ("a folder that others may write to", "/slipsweep: other users may write to it"),
+        ("a full disk", "anew: File too large; NUMBA_CACHE_DIR sets another folder"),
         ("no compilation", ""),
     ],
 )
@@ -182,11 +189,12 @@ def test_without_a_folder_of_its_own_all_still_runs_and_the_reason_is_said(
         env["XDG_CACHE_HOME"] = "/dev/null/no-folder"
     elif why == "no compilation":
         env["NUMBA_DISABLE_JIT"] = "1"
-    else:
+    elif why == "a folder that others may write to":
         folder = tmp_path / "cache" / "slipsweep"
         folder.mkdir(parents=True)
         folder.chmod(0o777)
-    done = process(ONE, env, str(tmp_path))
+    preexec_fn = limited if why == "a full disk" else None
+    done = process(ONE, env, str(tmp_path), preexec_fn=preexec_fn)
     value, compiled = done.stdout.split()
     assert float(value) == pytest.approx(TOTAL)
     assert (compiled == "True") == (why != "no compilation")

@@ -86,7 +86,8 @@ def _compiled(function: Callable[..., Any], types: tuple[Any, ...]) -> Any:
                     stack.enter_context(lock_held(lock, _PATIENCE))
                 return _compiled_in(folder, function, types)
         except OSError as error:
-            _warn(f"{error.filename}: {error.strerror}" if error.strerror else str(error))
+            place = f"{error.filename}: " if error.filename else ""
+            _warn(f"{place}{error.strerror or error}")
         return _compiled_in(None, function, types)
 
 
