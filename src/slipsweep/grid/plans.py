@@ -169,16 +169,12 @@ def plan_sweep(
     results = known.RESULTS if is_wave else known.RECORD_RESULTS
     default: tuple[str, ...] = known.DEFAULT_RESULTS if is_wave else known.DEFAULT_RECORD_RESULTS
     default += ("motion_factor",) if isinstance(problem.excitation, Suite) else ()
-    has_extremes = options.slides_both_ways(problem.model) and not isinstance(
-        problem.solver, options.Step
-    )
+    has_extremes = options.slides_both_ways(problem.model)
     default += tuple(known.EXTREMES) if has_extremes else ()
     wanted = default if variables is None else check_choices("variables", variables, results)
     for name in known.EXTREMES:
         if name in wanted and not has_extremes:
-            raise InputError(
-                f"variables: {name}: only with model = Newmark(sliding='both') and solver = 'cycle'"
-            )
+            raise InputError(f"variables: {name}: only with model = Newmark(sliding='both')")
     solved = grid_inputs.inputs_of(problem, coords)
     drive = _drive(solved)
     if "displacement_amplitude" in drive:
@@ -199,7 +195,10 @@ def plan_sweep(
     ):
         tasks.append(_task(engine.solve, problem, motion, solved))
     if "newmark_displacement" in wanted:
-        classical = replace(problem, model=options.Newmark(g=problem.model.g))
+        constant = options.Newmark(g=problem.model.g)
+        is_changing = options.changing_strength(problem.model) is not None
+        solver_of_constant = options.Cycle() if is_changing else problem.solver
+        classical = replace(problem, model=constant, solver=solver_of_constant)
         tasks.append(_task(engine.solve, classical, ("newmark_displacement",), solved))
     cost = cost_of(problem) * max(len(tasks), 1)
     # one that was given is a coordinate already
@@ -317,6 +316,8 @@ def _about(problem: grid_inputs.Problem, given: Collection[str]) -> dict[str, An
     if options.slides_both_ways(problem.model):
         is_given = "upslope_yield_acceleration" in given
         sources += f"; Üy,up {'given' if is_given else 'by statics, from Üy and θ'}"
+    if changing := options.changing_strength(problem.model):
+        sources += f"; {options.STRENGTH_TEXT[changing]}"
     inputs = {"friction_inputs": sources}
     return {
         "title": title,

@@ -53,6 +53,11 @@ def simulate(
     decay_rate: float | None = None,
     delta_mu: float | None = None,
     minimum_friction: float | None = None,
+    residual_mu: float | None = None,
+    residual_phi: float | None = None,
+    weakening_distance: float | None = None,
+    fast_mu: float | None = None,
+    rate_constant: float | None = None,
     structure_frequency: float | None = None,
 ) -> xr.Dataset:
     """Time history of one block: event by event, so that the samples are exact, or by steps.
@@ -118,6 +123,11 @@ def simulate(
         decay_rate=decay_rate,
         delta_mu=delta_mu,
         minimum_friction=minimum_friction,
+        residual_mu=residual_mu,
+        residual_phi=residual_phi,
+        weakening_distance=weakening_distance,
+        fast_mu=fast_mu,
+        rate_constant=rate_constant,
         structure_frequency=structure_frequency,
     )
     problem = grid_inputs.check_problem(excitation, model, solver)

@@ -75,6 +75,11 @@ def limit_amplitude(
     decay_rate: Values | None = None,
     delta_mu: Values | None = None,
     minimum_friction: Values | None = None,
+    residual_mu: Values | None = None,
+    residual_phi: Values | None = None,
+    weakening_distance: Values | None = None,
+    fast_mu: Values | None = None,
+    rate_constant: Values | None = None,
     structure_frequency: Values | None = None,
     maximum_amplitude: float | None = None,
     amplitude_steps: int = AMPLITUDE_STEPS,
@@ -150,6 +155,11 @@ def limit_amplitude(
         decay_rate=decay_rate,
         delta_mu=delta_mu,
         minimum_friction=minimum_friction,
+        residual_mu=residual_mu,
+        residual_phi=residual_phi,
+        weakening_distance=weakening_distance,
+        fast_mu=fast_mu,
+        rate_constant=rate_constant,
         structure_frequency=structure_frequency,
     )
     plan = plan_limits(

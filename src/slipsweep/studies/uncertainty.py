@@ -91,6 +91,11 @@ def sample(
     decay_rate: datasets.Values | None = None,
     delta_mu: datasets.Values | None = None,
     minimum_friction: datasets.Values | None = None,
+    residual_mu: datasets.Values | None = None,
+    residual_phi: datasets.Values | None = None,
+    weakening_distance: datasets.Values | None = None,
+    fast_mu: datasets.Values | None = None,
+    rate_constant: datasets.Values | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> xr.Dataset:
     """Quantiles and exceedance probabilities of the permanent displacement under uncertain inputs.
@@ -200,6 +205,11 @@ def sample(
         decay_rate=decay_rate,
         delta_mu=delta_mu,
         minimum_friction=minimum_friction,
+        residual_mu=residual_mu,
+        residual_phi=residual_phi,
+        weakening_distance=weakening_distance,
+        fast_mu=fast_mu,
+        rate_constant=rate_constant,
     )
     sampling = Sampling(
         uncertain,
