@@ -178,6 +178,17 @@ def test_agreement_with_steps(motion: Any) -> None:
     assert float((apart / (largest + 1e-9)).max()) < 1e-7
 
 
+def test_suite_is_its_records() -> None:
+    records = [noise(6), noise(7)]
+    suite = slipsweep.Suite(tuple(records), ("first", "second"))
+    block: dict[str, Any] = {"theta": 3.0, "mu_s": [0.1, 0.2], "model": BOTH, "scale": 2.0}
+    together = sweep(**block, excitation=suite)
+    for record, label in zip(records, suite.labels, strict=True):
+        alone = sweep(**block, excitation=record)
+        for name in RESULTS:
+            np.testing.assert_array_equal(together[name].sel(motion=label), alone[name])
+
+
 def test_no_sliding_upslope_is_sliding_downslope() -> None:
     """On a slope so steep that no acceleration moves the block upslope."""
     record = noise(5)

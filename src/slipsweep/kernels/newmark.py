@@ -250,35 +250,12 @@ def add(block: Block, moved: float) -> None:
 
 
 @scalar
-def slide_on_lines(block: Block, pieces: np.ndarray, p: int, end: int) -> int:
-    """Slide along whole straight pieces; return the first in which V stops or turns, or `end`."""
-    side = math.copysign(1.0, block.velocity)
-    limit = block.yield_acceleration if side > 0.0 else block.upslope_yield_acceleration
-    scale = side * block.amplitude
-    speed = side * block.velocity
-    largest = speed
-    slowest = speed
-    moved = 0.0
-    while p < end:
-        piece = pieces[p]
-        rate = scale * piece.first - limit
-        last_rate = scale * piece.last - limit
-        length = piece.finish - piece.begin
-        last_speed = speed + 0.5 * (rate + last_rate) * length
-        turns = rate > 0.0 > last_rate or rate < 0.0 < last_rate
-        if turns or last_speed <= 0.0 or piece.degree > 1:
-            break
-        moved += (speed + (2.0 * rate + last_rate) * length / 6.0) * length
-        speed = last_speed
-        largest = max(largest, speed)
-        slowest = min(slowest, speed)
-        p += 1
-    add(block, side * moved)
-    block.velocity = side * speed
-    block.slowest = min(block.slowest, slowest)
-    if side > 0.0:
-        block.largest_velocity = max(block.largest_velocity, largest)
-    return p
+def reach(block: Block, velocity: float) -> None:
+    """Set V, and where it is 0 the extremes of W over time, which lie there."""
+    block.velocity = velocity
+    if velocity == 0.0:
+        block.largest_displacement = max(block.largest_displacement, block.displacement)
+        block.smallest_displacement = min(block.smallest_displacement, block.displacement)
 
 
 @scalar
@@ -312,13 +289,10 @@ def slide_along(
     gained, moved = gains(piece, curve, scale, excess, tau, end)
     add(block, side * (moved + speed * (end - tau)))
     speed = 0.0 if stops else max(speed + gained, 0.0)
-    block.velocity = side * speed
+    reach(block, side * speed)
     if side > 0.0:
         block.largest_velocity = max(block.largest_velocity, largest, speed)
     block.slowest = min(block.slowest, speed)
-    if speed == 0.0:
-        block.largest_displacement = max(block.largest_displacement, block.displacement)
-        block.smallest_displacement = min(block.smallest_displacement, block.displacement)
     return end
 
 
@@ -365,59 +339,26 @@ def move_along(block: Block, piece: Piece, curve: Curve, wants_peak: bool) -> No
 
 
 @scalar
-def walk(block: Block, path: Path, first: int, end: int, wants_peak: bool) -> float:
-    """Go through some pieces; return how many half waves in which Üg exceeds Üy have passed.
-
-    A block at rest that slides downslope only goes on at the next of them.
-    """
+def walk(block: Block, path: Path, first: int, end: int, wants_peak: bool) -> None:
+    """Go through some pieces."""
     pieces = path.base.pieces
-    intervals = path.intervals
     amplitude = block.amplitude
     downslope = block.yield_acceleration
     upslope = block.upslope_yield_acceleration
-    one_way = upslope == math.inf
-    pulses = 0.0
-    k = 0
-    p = first
-    while p < end:
-        if block.velocity == 0.0:
-            if one_way:
-                while k < intervals.size:
-                    exceeds = amplitude * intervals[k].height > downslope
-                    if exceeds and intervals[k].end > p:
-                        break
-                    pulses += 1.0 if exceeds else 0.0
-                    k += 1
-                if k == intervals.size:
-                    return pulses
-                p = max(p, intervals[k].first)
-            while p < end and -upslope <= amplitude * pieces[p].top <= downslope:
-                p += 1
-            if p >= end:
-                break
-            if one_way and p >= intervals[k].end:
-                continue
-        else:
-            p = slide_on_lines(block, pieces, p, end)
-            if p == end:
-                break
+    for p in range(first, end):
         piece = pieces[p]
-        move_along(block, piece, path.base.curves[piece.curve], wants_peak)
-        p += 1
-    for later in range(k, intervals.size):
-        pulses += 1.0 if amplitude * intervals[later].height > downslope else 0.0
-    return pulses
+        if block.velocity != 0.0 or not -upslope <= amplitude * piece.top <= downslope:
+            move_along(block, piece, path.base.curves[piece.curve], wants_peak)
 
 
 @scalar
-def walk_cycles(block: Block, path: Path, wants_peak: bool) -> float:
-    """Go through all cycles of the path; return the number of pulses of a record.
+def walk_cycles(block: Block, path: Path, wants_peak: bool) -> None:
+    """Go through all cycles of the path.
 
     A cycle that begins with the same V as one of the same shape gains the same.  Where V keeps its
     sign throughout, the next cycles gain the same V as long as it does, and W is a series.
     """
     period = 2.0 * math.pi
-    pulses = 0.0
     shape = -1  # of the cycle that is remembered, and V and W at its beginning
     start = 0.0
     before = 0.0
@@ -452,7 +393,7 @@ def walk_cycles(block: Block, path: Path, wants_peak: bool) -> float:
             velocity = block.velocity
             displacement = block.displacement
             block.slowest = abs(velocity)
-            pulses += walk(block, path, path.cycles[c].first, path.cycles[c + 1].first, wants_peak)
+            walk(block, path, path.cycles[c].first, path.cycles[c + 1].first, wants_peak)
             left -= 1
             age += 1
             loss = abs(velocity) - abs(block.velocity)
@@ -466,27 +407,17 @@ def walk_cycles(block: Block, path: Path, wants_peak: bool) -> float:
                 age += int(alike)
     block.largest_displacement = max(block.largest_displacement, largest)
     block.smallest_displacement = min(block.smallest_displacement, smallest)
-    return pulses
 
 
 @scalar
-def solve_cell(
-    block: Block, cell: np.record, g: float, path: Path, wants_peak: bool, result: np.ndarray
-) -> None:
-    """Move a cell's block through the shaking and on to rest; `result` is (`RESULTS`,)."""
+def begin(block: Block, cell: np.record, g: float) -> bool:
+    """Set the block of a cell to rest; return False if it is statically unstable."""
     onset = given_or(
         cell.yield_acceleration, eq.coulomb_yield_acceleration(cell.mu_s, cell.tan_theta, g)
     )
-    result[2] = -1.0
-    result[3] = float(STATICALLY_UNSTABLE)
-    result[4] = result[5] = result[6] = -1.0
-    result[0] = result[1] = result[7] = result[8] = math.nan
-    if onset <= 0.0:
-        return
     block.amplitude = cell.amplitude
     block.yield_acceleration = onset
-    upslope = given_or(cell.upslope_yield_acceleration, math.inf)
-    block.upslope_yield_acceleration = upslope
+    block.upslope_yield_acceleration = given_or(cell.upslope_yield_acceleration, math.inf)
     block.velocity = 0.0
     block.displacement = 0.0
     block.lost = 0.0
@@ -494,13 +425,19 @@ def solve_cell(
     block.largest_displacement = 0.0
     block.smallest_displacement = 0.0
     block.slips = 0.0
-    pulses = walk_cycles(block, path, wants_peak)
+    return onset > 0.0
+
+
+@scalar
+def store(block: Block, pulses: float, result: np.ndarray) -> None:
+    """Let the block run out after the shaking, and write what has become of it (`RESULTS`,)."""
     side = math.copysign(1.0, block.velocity)
-    limit = onset if side > 0.0 else upslope
+    limit = block.yield_acceleration if side > 0.0 else block.upslope_yield_acceleration
     block.displacement += side * block.velocity * block.velocity / (2.0 * limit)
+    slides = block.amplitude > block.yield_acceleration
+    slides |= block.amplitude > block.upslope_yield_acceleration
     result[0] = block.displacement
     result[1] = block.largest_velocity
-    slides = cell.amplitude > onset or cell.amplitude > upslope
     result[2] = float(eq.STICK_SLIP if slides else eq.STUCK)
     result[3] = float(UNSOLVED if math.isnan(block.displacement) else 0)
     result[4] = block.slips
@@ -508,6 +445,15 @@ def solve_cell(
     result[6] = 0.0
     result[7] = max(block.largest_displacement, block.displacement)
     result[8] = min(block.smallest_displacement, block.displacement)
+
+
+@scalar
+def store_no_value(result: np.ndarray) -> None:
+    """Write the results of a block that is statically unstable."""
+    result[0] = result[1] = result[7] = result[8] = math.nan
+    result[2] = -1.0
+    result[3] = float(STATICALLY_UNSTABLE)
+    result[4] = result[5] = result[6] = -1.0
 
 
 @kernel
@@ -523,5 +469,10 @@ def solve_newmark(
 
     `blocks`, (1,) of `BLOCK`, is what the motion is kept in.
     """
+    block = blocks[0]
     for j in range(cells.size):
-        solve_cell(blocks[0], cells[j], g, path, wants_peak, results[:, j])
+        if begin(block, cells[j], g):
+            walk_cycles(block, path, wants_peak)
+            store(block, 0.0, results[:, j])
+        else:
+            store_no_value(results[:, j])
