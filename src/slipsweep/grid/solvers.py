@@ -8,8 +8,9 @@ import numpy as np
 
 from slipsweep.grid.inputs import Problem
 from slipsweep.kernels import block as physics
-from slipsweep.kernels import newmark, newmark_record, step
+from slipsweep.kernels import history, newmark, newmark_record, step
 from slipsweep.kernels.grid import CELL, find_parameters
+from slipsweep.kernels.newmark_history import fill_newmark_history
 from slipsweep.kernels.sine.solve import solve_sine
 from slipsweep.kernels.walk import solve_walk, workspace_of
 from slipsweep.model.options import Mendez, Newmark, Step, slides_both_ways
@@ -148,6 +149,28 @@ def path_under(motion: Waveform | Record, polarity: float) -> Path:
     if isinstance(motion, Record):
         return cutting.path_of_record(motion, polarity)
     return cutting.path_of_waveform(motion)
+
+
+def fill_history(
+    problem: Problem,
+    fields: Mapping[str, Any],
+    path: Path,
+    phases: np.ndarray,
+    samples: history.History,
+) -> None:
+    """Fill a history from event to event, at increasing phases (of a record: times at scale 1).
+
+    `fields` are those of a cell, single numbers (`engine.cell_inputs`).
+    """
+    options = options_of(problem, wants_peak=True)
+    if isinstance(problem.model, Newmark):
+        cells = np.full(1, math.nan, newmark.NEWMARK_CELL)
+        for name in newmark.NEWMARK_CELL.names or ():
+            cells[name] = fields.get(name, math.nan)
+        fill_newmark_history(cells, options.g, options.cycles, path, phases, samples)
+        return
+    cell = physics.Cell(*(float(fields.get(name, math.nan)) for name in physics.Cell._fields))
+    history.fill_history(cell, options, path, phases, samples)
 
 
 def stepper_of(

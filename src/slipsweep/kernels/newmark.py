@@ -30,6 +30,9 @@ NEWMARK_CELL = np.dtype(
     (np.record, [(name, "f8") for name in (*DOWNSLOPE_FIELDS, "upslope_yield_acceleration")])
 )
 
+#: Most slides along a piece: up to a stop, the other way, and up to a stop again.
+MOST_PARTS = 3
+
 #: A block and its motion up to now.
 BLOCK = np.dtype(
     (
@@ -46,12 +49,21 @@ BLOCK = np.dtype(
             ("smallest_displacement", "f8"),
             ("slips", "f8"),
             ("lost", "f8"),  # what rounding has taken from W (Kahan's sum)
+            # slides along the piece gone through last: their number, and of each the τ of its
+            # start and end, its side, and speed and W at its start
+            ("parts", "i8"),
+            ("part_start", "f8", (MOST_PARTS,)),
+            ("part_end", "f8", (MOST_PARTS,)),
+            ("part_side", "f8", (MOST_PARTS,)),
+            ("part_speed", "f8", (MOST_PARTS,)),
+            ("part_displacement", "f8", (MOST_PARTS,)),
         ],
     )
 )
 
-#: A record of `BLOCK`; its fields have no types that mypy knows.
+#: Records of `BLOCK` and `NEWMARK_CELL`; their fields have no types that mypy knows.
 Block: TypeAlias = Any
+Cell: TypeAlias = Any
 
 #: Rows of the results of a cell; the counts are those of a record.
 RESULTS = (
@@ -318,8 +330,8 @@ def onset_on(block: Block, piece: Piece, curve: Curve, tau: float) -> float:
 def move_along(block: Block, piece: Piece, curve: Curve, wants_peak: bool) -> None:
     """Take the block along a piece: it slides, stops, rests and slides again."""
     tau = piece.begin
-    # at most a stop, a slide the other way, and a stop of that
-    for _ in range(3):
+    block.parts = 0
+    for part in range(MOST_PARTS):
         if block.velocity == 0.0:
             tau = onset_on(block, piece, curve, tau)
             if tau >= piece.finish:
@@ -328,7 +340,13 @@ def move_along(block: Block, piece: Piece, curve: Curve, wants_peak: bool) -> No
             side = math.copysign(1.0, piece.top)
         else:
             side = math.copysign(1.0, block.velocity)
+        block.parts += 1
+        block.part_start[part] = tau
+        block.part_side[part] = side
+        block.part_speed[part] = side * block.velocity
+        block.part_displacement[part] = block.displacement
         tau = slide_along(block, piece, curve, tau, side, wants_peak)
+        block.part_end[part] = tau
         if tau >= piece.finish or math.isnan(tau):
             return
         if side * piece.top > 0.0 and piece.begin == 0.0:
@@ -410,7 +428,7 @@ def walk_cycles(block: Block, path: Path, wants_peak: bool) -> None:
 
 
 @scalar
-def begin(block: Block, cell: np.record, g: float) -> bool:
+def begin(block: Block, cell: Cell, g: float) -> bool:
     """Set the block of a cell to rest; return False if it is statically unstable."""
     onset = given_or(
         cell.yield_acceleration, eq.coulomb_yield_acceleration(cell.mu_s, cell.tan_theta, g)

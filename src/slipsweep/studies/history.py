@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError
 from slipsweep.grid import engine, plans, resources, solvers
 from slipsweep.grid import inputs as grid_inputs
-from slipsweep.kernels import history as kernels
 from slipsweep.kernels import step
-from slipsweep.kernels.block import Cell, Motion
+from slipsweep.kernels.block import Motion
+from slipsweep.kernels.history import History
 from slipsweep.model import options, parameters, variables
 from slipsweep.model.variables import HISTORY
 from slipsweep.motion import cutting
@@ -120,7 +120,6 @@ def simulate(
         structure_frequency=structure_frequency,
     )
     problem = grid_inputs.check_problem(excitation, model, solver)
-    options.check_one_way("simulate", getattr(problem.model, "sliding", None))
     motion = problem.excitation
     if isinstance(motion, Suite):
         one_motion = f"suite[{motion.labels[0]!r}]{'.rotated(azimuth)' if motion.has_pairs else ''}"
@@ -166,7 +165,7 @@ class _History:
         self.summary = summary
         given = engine.cell_inputs(problem, inputs)
         motion = problem.excitation
-        self.cell = Cell(*(float(given.get(name, math.nan)) for name in Cell._fields))
+        self.fields = {name: float(value) for name, value in given.items()}
         self.options = solvers.options_of(problem, wants_peak=True)
         self.record = motion if isinstance(motion, Record) else None
         if self.record is not None:
@@ -193,9 +192,9 @@ class _History:
         polarity = 1.0 if self.record is None else float(self.inputs["polarity"])
         stepper = solvers.stepper_of(self.problem, self.options, polarity)
         cells = np.full((1, len(step.STEP_CELL.names or ())), math.nan).view(step.STEP_CELL)[:, 0]
-        for name, value in zip(Cell._fields, self.cell, strict=True):
+        for name, value in self.fields.items():
             cells[name] = value
-        table[0] = self.cell.amplitude * values_at(self.path, phases)
+        table[0] = self.fields["amplitude"] * values_at(self.path, phases)
         history = step.history_of(phases, table[0])
         _interruptible(stepper, cells, history, np.empty((len(Motion._fields), 1)))
         table[1] = history.block_acceleration
@@ -206,12 +205,7 @@ class _History:
     def _walk(self, phases: Floats, table: Floats) -> None:
         """Fill in a history from event to event."""
         _interruptible(
-            kernels.fill_history,
-            self.cell,
-            self.options,
-            self.path,
-            phases,
-            kernels.History(*table),
+            solvers.fill_history, self.problem, self.fields, self.path, phases, History(*table)
         )
 
     def columns(self, phases: Floats) -> dict[str, xr.Variable]:
@@ -240,7 +234,7 @@ class _History:
         if self.record is None:
             return {}
         with np.errstate(over="ignore"):
-            peak = self.path.intervals["height"] * self.cell.amplitude
+            peak = self.path.intervals["height"] * self.fields["amplitude"]
         given = {**self.inputs, "amplitude": xr.Variable("half_wave", peak)}
         request = engine.Request(self.problem, {"half_wave": peak.size}, given, ("sliding_mode",))
         mode = engine.friction_parameters(request)["sliding_mode"].values
