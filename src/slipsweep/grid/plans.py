@@ -172,7 +172,7 @@ def plan_sweep(
     has_extremes = options.slides_both_ways(problem.model) and not isinstance(
         problem.solver, options.Step
     )
-    default += tuple(known.EXTREMES) if has_extremes else ()
+    default += known.DEFAULT_EXTREMES if has_extremes else ()
     wanted = default if variables is None else check_choices("variables", variables, results)
     for name in known.EXTREMES:
         if name in wanted and not has_extremes:

@@ -76,6 +76,7 @@ RESULTS = (
     "continuous_pulses",
     "largest_displacement",
     "smallest_displacement",
+    "clearance",
 )
 
 #: Relative size of the last step to a root, whose error is its square, and the most steps.
@@ -463,15 +464,16 @@ def store(block: Block, pulses: float, result: np.ndarray) -> None:
     result[6] = 0.0
     result[7] = max(block.largest_displacement, block.displacement)
     result[8] = min(block.smallest_displacement, block.displacement)
+    result[9] = result[7] - result[8]
 
 
 @scalar
 def store_no_value(result: np.ndarray) -> None:
     """Write the results of a block that is statically unstable."""
-    result[0] = result[1] = result[7] = result[8] = math.nan
+    result[:] = math.nan
     result[2] = -1.0
     result[3] = float(STATICALLY_UNSTABLE)
-    result[4] = result[5] = result[6] = -1.0
+    result[4:7] = -1.0
 
 
 @kernel

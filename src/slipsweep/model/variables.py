@@ -5,6 +5,7 @@
 figures all take their words from here.
 """
 
+from collections.abc import Mapping
 from enum import IntEnum, IntFlag, StrEnum
 from typing import Any, Self
 
@@ -269,9 +270,7 @@ STRENGTHS = ("amplitude", "scale", "pgv", "arias_intensity")
 
 #: Inputs that may be drawn: all that the displacement depends on.
 DRAWN = tuple(
-    name
-    for name in PARAMETERS
-    if name not in ("structure_frequency", "polarity", "azimuth", "upslope_yield_acceleration")
+    name for name in PARAMETERS if name not in ("structure_frequency", "polarity", "azimuth")
 )
 
 #: Results of Newmark's block that slides both ways: extremes of u over time.
@@ -282,6 +281,7 @@ EXTREMES: dict[str, dict[str, Any]] = {
     "smallest_displacement": _cf(
         "m", "smallest relative displacement over time, downslope", "validity", comment=_DIRECTION
     ),
+    "clearance": _cf("m", "clearance, largest less smallest displacement over time", "validity"),
 }
 
 #: Results of a sweep: attributes of the variables.
@@ -434,6 +434,23 @@ SUITE_STATISTICS: dict[str, dict[str, Any]] = {
     "exceedance_probability": STATISTICS["exceedance_probability"],
 }
 
+
+def has_signed_displacements(attributes: Mapping[Any, Any]) -> bool:
+    """Return whether displacements of a result with these attributes may be negative by design."""
+    return bool(attributes.get("sliding") == "both")
+
+
+def counted(about: Mapping[str, Any], attributes: Mapping[Any, Any]) -> dict[str, Any]:
+    """Return the attributes of a statistic of the permanent displacement, of |u| where u has signs.
+
+    `attributes` are those of the result.
+    """
+    text = str(about["long_name"])
+    if not has_signed_displacements(attributes) or "permanent displacement" not in text:
+        return dict(about)
+    return {**about, "long_name": f"{text}, by magnitude |u|"}
+
+
 #: The mean annual rate at which a displacement is exceeded, and its parts that lie outside of the
 #: grid's amplitudes.
 HAZARD_RESULTS: dict[str, dict[str, Any]] = {
@@ -475,6 +492,12 @@ RESULT_DTYPES: dict[str, str] = {
     "sensitivity_status": "int8",
     **dict.fromkeys(RECORD_COUNTS, "int32"),
 }
+
+#: Of the extremes, those that `sweep` returns where no variables are named.
+DEFAULT_EXTREMES = ("largest_displacement", "smallest_displacement")
+
+#: Displacements that may be negative where a block slides both ways.
+SIGNED = ("permanent_displacement", *DEFAULT_EXTREMES)
 
 #: What `sweep` returns where no variables are named; of a suite also the factor on each motion.
 DEFAULT_RESULTS = ("permanent_displacement", "peak_relative_velocity", "sliding_mode", "validity")
