@@ -294,10 +294,7 @@ def test_what_goes_with_both_ways_only(given: dict[str, Any], message: str) -> N
     assert str(error.value).startswith(message)
 
 
-def test_what_takes_one_direction_only_refuses_both() -> None:
-    block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.4, "frequency": 1.0, "model": BOTH}
-    with pytest.raises(InputError, match="limit_amplitude: not allowed with sliding = 'both'"):
-        slipsweep.limit_amplitude(0.05, **block)
-    result = sweep(amplitude=[3.0, 4.0], **block)
-    with pytest.raises(InputError, match="not allowed with sliding = 'both'"):
-        result.slipsweep.chart()
+def test_extremes_by_steps_are_refused() -> None:
+    block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.4, "amplitude": 3.0, "frequency": 1.0}
+    with pytest.raises(InputError, match="clearance: only with model = Newmark"):
+        sweep(**block, model=BOTH, solver="step", variables=["clearance"])

@@ -33,7 +33,8 @@ class Typed:
         float | None, RARE("Üy/g of Newmark's block, instead of --theta and --mu-s.")
     ] = None
     upslope_yield_acceleration: Annotated[
-        Text, RARE("Yield acceleration upslope, with --sliding both (default: by statics).", "VALUE")
+        Text,
+        RARE("Yield acceleration upslope, with --sliding both (default: by statics).", "VALUE"),
     ] = None
     decay_rate: Annotated[float | None, BLOCK("Friction decay λ (default: Eq. 6 at the peak).")] = (
         None

@@ -440,15 +440,20 @@ def has_signed_displacements(attributes: Mapping[Any, Any]) -> bool:
     return bool(attributes.get("sliding") == "both")
 
 
-def counted(about: Mapping[str, Any], attributes: Mapping[Any, Any]) -> dict[str, Any]:
-    """Return the attributes of a statistic of the permanent displacement, of |u| where u has signs.
+def counted_text(text: str, attributes: Mapping[Any, Any]) -> str:
+    """Return words for what is counted of permanent displacements: |u|, where u has signs.
 
     `attributes` are those of the result.
     """
-    text = str(about["long_name"])
-    if not has_signed_displacements(attributes) or "permanent displacement" not in text:
-        return dict(about)
-    return {**about, "long_name": f"{text}, by magnitude |u|"}
+    is_of_displacement = "permanent displacement" in text.lower()
+    if is_of_displacement and has_signed_displacements(attributes):
+        return f"{text}, by magnitude |u|"
+    return text
+
+
+def counted(about: Mapping[str, Any], attributes: Mapping[Any, Any]) -> dict[str, Any]:
+    """Return the attributes of a statistic with the words of `counted_text`."""
+    return {**about, "long_name": counted_text(str(about["long_name"]), attributes)}
 
 
 #: The mean annual rate at which a displacement is exceeded, and its parts that lie outside of the

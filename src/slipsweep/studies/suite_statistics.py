@@ -18,6 +18,7 @@ from slipsweep.model.variables import (
     LimitStatus,
     Validity,
     counted,
+    counted_text,
     has_signed_displacements,
 )
 from slipsweep.studies.sampling import Thresholds, check_increasing, check_thresholds
@@ -145,7 +146,7 @@ def suite_statistics(
     }
     attrs = {
         **result.attrs,
-        "title": TITLE,
+        "title": counted_text(TITLE, result.attrs),
         "suite_dimensions": " ".join(dims),
         "zero_displacement": float(least),
     }
@@ -249,6 +250,7 @@ def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100)
         found = at_thresholds(found, displacement).transpose(*grid, ...).load()
     else:
         found = suite_statistics(result, thresholds=0.0 if displacement is None else displacement)
+    symbol = "|u|" if has_signed_displacements(result.attrs) else "u"
     varying = [dim for dim, size in grid.items() if size > 1]
     # peak ground accelerations in g
     factors = {"amplitude": 1.0 / float(found.attrs.get("g", np.nan))}
@@ -273,13 +275,11 @@ def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100)
         for d, column in zip(
             found["threshold"].values, rows["exceedance_probability"], strict=True
         ):
-            show(f"P(u > {d * 1000.0:.6g} mm)", column, ".1%")
+            show(f"P({symbol} > {d * 1000.0:.6g} mm)", column, ".1%")
     if (rows["valueless_share"] > 0.0).any():
         show("no value", rows["valueless_share"][0], ".1%")
     counts = (
-        "|permanent displacement|"
-        if has_signed_displacements(result.attrs)
-        else "permanent displacement"
+        "permanent displacement" if symbol == "u" else "magnitude of the permanent displacement"
     )
     return [
         f"{counts} (mm) over {suite}:",

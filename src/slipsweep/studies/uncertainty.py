@@ -245,7 +245,8 @@ def plan_samples(
     about = options.friction_inputs(
         problem.model.name, coords, {name: one.kind for name, one in drawn.items()}
     )
-    attrs = {**plan.attrs, "title": TITLE, "friction_inputs": about, **sampling.attributes}
+    title = variables.counted_text(TITLE, plan.attrs)
+    attrs = {**plan.attrs, "title": title, "friction_inputs": about, **sampling.attributes}
     return SamplePlan(sampling, problem, coords, attrs)
 
 
