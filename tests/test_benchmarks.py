@@ -25,6 +25,7 @@ WRITES = {
     "agreement": ["agreement.md"],
     "limits": ["limits.md"],
     "compiling": ["compiling.md"],
+    "both_ways": ["both_ways.md"],
 }
 
 #: Half a minute of processes, clusters and compilation.

@@ -187,8 +187,10 @@ def _suite_notes(
         > _MUCH * rate,
         f"below {first:.4g} g nothing is counted: to compute it, begin the axis amplitude lower": omitted
         > _MUCH * rate,
-        f"{chance} grows much from one amplitude to the next: the rates may be wrong by the factors above; put more "
-        "values on the axis amplitude": (rates["upper_rate"] > 2.0 * rates["lower_rate"])
+        f"{chance} grows much from one amplitude to the next: the rates may be wrong by the "
+        "factors above; put more values on the axis amplitude": (
+            rates["upper_rate"] > 2.0 * rates["lower_rate"]
+        )
         & (held < rate),
     }
 
