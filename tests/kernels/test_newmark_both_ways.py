@@ -222,6 +222,31 @@ def test_history_obeys_the_rules_of_motion() -> None:
     np.testing.assert_allclose(np.diff(history.relative_displacement), moved, atol=1e-7)
 
 
+@pytest.mark.parametrize("model", [Newmark(), BOTH])
+def test_the_same_lines_sampled_more_finely(model: Newmark) -> None:
+    """Samples are taken together in runs: in others, if there are three times as many."""
+    random = np.random.default_rng(11)
+    places = np.arange(1201) / 3.0
+    smooth = np.convolve(random.normal(size=401), np.hanning(25), "same")
+    coarse = Record.sampled(smooth, 0.02)
+    fine = Record.sampled(np.interp(places, np.arange(401), smooth), 0.02 / 3.0)
+    downslope, upslope = (
+        xr.DataArray(np.geomspace(0.002, 4.0, 60), dims="cell"),
+        xr.DataArray(random.permutation(np.geomspace(0.002, 4.0, 60)), dims="cell"),
+    )
+    block: dict[str, Any] = {"theta": 0.0, "mu_s": 0.1, "yield_acceleration": downslope}
+    if model == BOTH:
+        block["upslope_yield_acceleration"] = upslope
+    one, other = (sweep(**block, excitation=record, model=model) for record in (coarse, fine))
+    assert int((one.number_of_slips > 0).sum()) > 40
+    for name in ("number_of_slips", "stick_slip_pulses"):
+        np.testing.assert_array_equal(one[name], other[name])
+    for name in ("permanent_displacement", "peak_relative_velocity", *RESULTS[1:]):
+        if name in one:
+            scale = float(np.abs(one[name]).max())
+            np.testing.assert_allclose(one[name], other[name], rtol=1e-10, atol=1e-12 * scale)
+
+
 def test_suite_is_its_records() -> None:
     records = [noise(6), noise(7)]
     suite = slipsweep.Suite(tuple(records), ("first", "second"))

@@ -1,4 +1,4 @@
-"""A block that slides both ways in statistics, hazard, uncertain inputs and charts: |u| is counted."""
+"""A block that slides both ways in statistics, hazard, samples and charts: |u| is counted."""
 
 from pathlib import Path
 from typing import Any

@@ -38,7 +38,7 @@ RESULTS = (
 
 @dataclass(frozen=True)
 class Cell:
-    """Amplitude, or factor on a record; yield accelerations; waveform, or samples at an interval."""
+    """Amplitude, or factor on a record; yield accelerations; waveform, or samples."""
 
     amplitude: float
     yield_acceleration: float
@@ -219,7 +219,7 @@ def reversal_without_rest() -> Iterator[Cell]:
 
 
 def limit_of_rest() -> Iterator[Cell]:
-    """A level base, where the stop meets the onset the other way: η at 1/√(1 + π²/4), and beside it."""
+    """A level base, where the stop meets the onset the other way: η about 1/√(1 + π²/4)."""
     for factor in (1.0, 1.0 + 2.0**-52, 1.0 - 2.0**-52, 1.0 + 1e-9, 1.0 - 1e-9):
         yield Cell(1.0, LIMIT_OF_REST * factor, LIMIT_OF_REST * factor, cycles=6)
 

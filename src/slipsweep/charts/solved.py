@@ -165,7 +165,7 @@ def boundaries(data: xr.Dataset, always: bool = False) -> xr.Dataset:
 
 
 def _first_onset(data: xr.Dataset, onset: xr.DataArray) -> xr.DataArray:
-    """Return the acceleration beyond which a block slides, downslope from `onset` on, or upslope."""
+    """Return the acceleration beyond which a block slides: `onset` downslope, or that upslope."""
     if not has_signed_displacements(data.attrs):
         return onset
     if "upslope_yield_acceleration" in data.coords:
