@@ -160,6 +160,8 @@ def test_simulate_prints_the_extremes(capsys: pytest.CaptureFixture[str]) -> Non
     )
     for name in ("permanent_displacement", "largest_displacement", "smallest_displacement"):
         assert f"{name.replace('_', ' '):<23} {float(exact[name]):.6g} m" in printed
+    clearance = float(exact.largest_displacement - exact.smallest_displacement)
+    assert f"{'clearance':<23} {clearance:.6g} m" in printed
 
 
 def test_a_sweep_file_and_its_page(tmp_path: Path) -> None:

@@ -130,7 +130,9 @@ def thresholds(data: xr.Dataset, always: bool = False) -> xr.Dataset:
     """Accelerations of yield and of the mode limit (Eq. 7) of a slice, m/s², along the dimensions they depend on.
 
     ``yield_line`` and, but for Newmark's block where not `always`, ``limit_line``; NaN where the
-    block slides under its own weight.  None for a record: each of its pulses has its own peak.
+    block slides under its own weight.  None for a record: each of its pulses has its own peak.  For
+    a block that slides both ways ``yield_line`` is the smaller of Üy and Üy,up, and there are also
+    ``downslope_line``, Üy, and ``upslope_line``, −Üy,up.
     """
     if is_recorded(data) and "half_wave_peak" not in data:
         return xr.Dataset()
@@ -159,21 +161,22 @@ def boundaries(data: xr.Dataset, always: bool = False) -> xr.Dataset:
         if always or not is_newmark(data):
             undefined = has_flags(found["validity"], Validity.LIMIT_UNDEFINED)
             lines["limit_line"] = found["limiting_acceleration"].where(~undefined)
-    lines["yield_line"] = _first_onset(data, onset)
+    lines["yield_line"] = onset
+    if has_signed_displacements(data.attrs):
+        upslope = _upslope_onset(data, onset)
+        lines["yield_line"] = xr.apply_ufunc(np.minimum, onset.reset_coords(drop=True), upslope)
+        lines["downslope_line"] = onset
+        lines["upslope_line"] = -upslope
     lines["rest_angle"] = xr.apply_ufunc(lambda ratio: np.degrees(np.arctan(ratio)), onset / g)
     return xr.Dataset(lines).reset_coords(drop=True)
 
 
-def _first_onset(data: xr.Dataset, onset: xr.DataArray) -> xr.DataArray:
-    """Return the acceleration beyond which a block slides: `onset` downslope, or that upslope."""
-    if not has_signed_displacements(data.attrs):
-        return onset
+def _upslope_onset(data: xr.Dataset, onset: xr.DataArray) -> xr.DataArray:
+    """Return Üy,up of a block that slides both ways: as given, or by statics from Üy."""
     if "upslope_yield_acceleration" in data.coords:
-        upslope = _bare(data["upslope_yield_acceleration"])
-    else:
-        upslope = upslope_yield_acceleration(onset, _bare(data["theta"]), float(data.attrs["g"]))
-    first: xr.DataArray = xr.apply_ufunc(np.minimum, onset.reset_coords(drop=True), upslope)
-    return first
+        given: xr.DataArray = _bare(data["upslope_yield_acceleration"])
+        return given
+    return upslope_yield_acceleration(onset, _bare(data["theta"]), float(data.attrs["g"]))
 
 
 def newmark(data: xr.Dataset) -> xr.DataArray | None:
