@@ -190,10 +190,12 @@ def test_narrow_peaks_where_blocks_do_not_recouple() -> None:
     ]
     columns = zip(names, zip(*rows, strict=True), strict=True)
     given: dict[str, Any] = {name: xr.DataArray([*values], dims="case") for name, values in columns}
-    target = given.pop("displacement")
-    limits = limit_amplitude(displacement=target, frequency=1.0, **given).limit_amplitude
+    # at the same amplitudes u ∝ 1/f²: metres and centimetres
+    given["frequency"] = xr.DataArray([1.0, 10.0] * 3 + [10.0], dims="case")
+    target = given.pop("displacement") / given["frequency"] ** 2
+    limits = limit_amplitude(displacement=target, **given).limit_amplitude
     amplitudes = np.geomspace(0.05, 6.0, 20_001)
-    moved = sweep(amplitude=amplitudes, frequency=1.0, **given).permanent_displacement
+    moved = sweep(amplitude=amplitudes, **given).permanent_displacement
     first = amplitudes[(moved >= target).transpose("case", "amplitude").values.argmax(axis=1)]
     assert ((limits <= first) & (limits > 0.9 * first)).all()
 
