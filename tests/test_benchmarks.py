@@ -24,6 +24,7 @@ WRITES = {
     "model_trends": ["experiments.md", "sensitivity.md", "model_trends.md"],
     "agreement": ["agreement.md"],
     "limits": ["limits.md"],
+    "compiling": ["compiling.md"],
 }
 
 #: Half a minute of processes, clusters and compilation.
@@ -78,6 +79,20 @@ def test_solvers_agree_on_a_few_cells(tmp_path: Path, monkeypatch: pytest.Monkey
         for row in rows:
             counts = dict(zip(heading, row, strict=True))
             assert counts["cells"] == counts["agreed"], row
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name", ["Cell", "Chart", "Walk", "RecordedMotion", "StepByStep", "FirstUse"]
+)
+def test_tasks_whose_times_are_kept_run(name: str) -> None:
+    """Those of asv_bench, which asv itself would report as failed."""
+    task = runpy.run_path(str(ROOT / "asv_bench" / "benchmarks" / "speed.py"))[name]()
+    parameters = getattr(task, "params", [])[:1]
+    if hasattr(task, "setup"):
+        task.setup(*parameters)
+    (timed,) = [method for method in dir(task) if method.startswith(("time_", "track_"))]
+    getattr(task, timed)(*parameters)
 
 
 def test_other_waves_of_the_papers_peaks() -> None:

@@ -130,7 +130,7 @@ def test_the_title_page_names_axes_and_flags(grid_file: Path) -> None:
         (lambda data: data.isel(theta=slice(0)), "holds no cells"),
         (
             lambda data: data.swap_dims(theta="case").isel(amplitude=0, frequency=0),
-            "needs an axis with two values",
+            "no axis has two values or more",
         ),
     ],
 )

@@ -43,7 +43,8 @@ def bars_of(figure: Figure) -> tuple[np.ndarray, np.ndarray]:
 
 
 def displacements(result: xr.Dataset, **where: float) -> xr.DataArray:
-    return result.permanent_displacement.sel(where).stack(each=["motion", "polarity"]) * 1000.0
+    values = result["permanent_displacement"].sel(where)
+    return values.stack(each=["motion", "polarity"]) * 1000.0
 
 
 # ------------------------------------------------------------------------------- suites

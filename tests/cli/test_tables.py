@@ -169,7 +169,7 @@ def test_simulate_prints_the_results_of_the_case(tmp_path: Path) -> None:
     assert f"permanent displacement  {found.permanent_displacement.item():.6g} m\n" in text
     assert f"peak relative velocity  {found.peak_relative_velocity.item():.6g} m/s\n" in text
     assert "sliding mode            continuous\n" in text
-    taken = "theta 5 degree, amplitude 8.829 m/s2 (0.9 g), frequency 1.8 Hz"
+    taken = "theta 5 degree, mu_s 0.38, amplitude 8.829 m/s2 (0.9 g), frequency 1.8 Hz"
     assert f"taken as                {taken}\n" in text
     for flag in Validity(found.validity.item()):
         assert f"{flag.kind:<24}{(flag.name or '').lower()}: {flag.text}\n" in text

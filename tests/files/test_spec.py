@@ -184,6 +184,7 @@ BAD = {
         "variables = 'validty': must be one of",
     ),
     "number for a path": (GOOD + "[output]\npath = 3", "output.path = 3: must be a text"),
+    "empty path": (GOOD + "[output]\npath = ''", 'output.path = "": must be the name of a file'),
     # axes
     "empty": (
         axis("theta", "values = []"),

@@ -16,7 +16,7 @@ import xarray as xr
 import slipsweep
 from slipsweep._version import __version__
 from slipsweep.errors import InputError
-from slipsweep.grid import engine
+from slipsweep.grid import solvers
 from slipsweep.model.variables import (
     DEFAULT_RESULTS,
     FRICTION_PARAMETERS,
@@ -41,7 +41,7 @@ GOOD: dict[str, Any] = {"theta": 5.0, "mu_s": 0.38, "amplitude": 3.0, "frequency
 def cells_solved(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Cells of each call of a motion kernel."""
     solved: list[int] = []
-    solver_of = engine.solvers.solver_of
+    solver_of = solvers.solver_of
 
     def counting(*arguments: Any) -> Any:
         solver = solver_of(*arguments)
@@ -52,7 +52,7 @@ def cells_solved(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
         return solver._replace(solve=call)
 
-    monkeypatch.setattr(engine.solvers, "solver_of", counting)
+    monkeypatch.setattr(solvers, "solver_of", counting)
     return solved
 
 
@@ -396,6 +396,7 @@ def test_attributes_tell_how_it_was_made() -> None:
     stepped = slipsweep.sweep(**GOOD, model="newmark", solver=slipsweep.Step(rule="simpson")).attrs
     assert (stepped["rule"], stepped["steps_per_cycle"]) == ("simpson", 1024)
     assert not {"rise", "recoupling"} & {*stepped}
+    assert "10.1680/geot.1965.15.2.139" in stepped["references"]
     assert slipsweep.friction_parameters(5.0, 0.38, 3.0).attrs.keys() == {
         "title",
         "source",

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import slipsweep
-from slipsweep.grid import engine, threads
+from slipsweep.grid import solvers, threads
 from slipsweep.kernels.block import UNSOLVED
 
 GRID: dict[str, Any] = {
@@ -26,7 +26,8 @@ GRID: dict[str, Any] = {
 
 def displacement(waveform: str = "sine") -> np.ndarray:
     result = slipsweep.sweep(**GRID, excitation=waveform, variables=["permanent_displacement"])
-    return result.permanent_displacement.values
+    values: np.ndarray = result.permanent_displacement.values
+    return values
 
 
 @pytest.fixture(scope="module")
@@ -140,7 +141,7 @@ def test_an_error_in_a_part_ends_the_whole(
 def test_an_error_in_a_tile_leaves_the_sweep(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its results would be memory that nothing has written."""
     monkeypatch.setattr(threads, "thread_count", lambda: count)
-    solver_of = engine.solvers.solver_of
+    solver_of = solvers.solver_of
 
     def failing(*arguments: Any) -> Any:
         solver = solver_of(*arguments)
@@ -151,7 +152,7 @@ def test_an_error_in_a_tile_leaves_the_sweep(count: int, monkeypatch: pytest.Mon
 
         return solver._replace(solve=solve)
 
-    monkeypatch.setattr(engine.solvers, "solver_of", failing)
+    monkeypatch.setattr(solvers, "solver_of", failing)
     with pytest.raises(
         slipsweep.RunError, match=r"mu_s = 0\.9, .*an event of the motion was not found"
     ):

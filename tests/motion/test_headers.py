@@ -47,7 +47,8 @@ def test_codes_of_cosmos_are_units(tmp_path: Path, code: int, unit: str, factor:
     text = COSMOS.read_text()
     assert text.count(COSMOS_LINE) == 1
     path = tmp_path / "motion.V1"
-    path.write_text(text.replace(COSMOS_LINE, f"       1       1{code:8d}     120"))
+    text = text.replace(COSMOS_LINE, f"       1       1{code:8d}     120")
+    path.write_text(text.replace("cm/sec2 (04)", f"{unit} ({code:02d})"))
     record = read_record(path, implausible="accept")
     assert record.acceleration[2] == pytest.approx(1.5 * factor, rel=1e-15)
     assert record.attrs["record_units"] == unit

@@ -1,5 +1,6 @@
 """Time histories: what they have in common with a sweep, a waveform and mechanics; slides that last long."""
 
+import os
 import subprocess
 import sys
 from typing import Any
@@ -325,6 +326,7 @@ except KeyboardInterrupt:
 """
 
 
+@pytest.mark.skipif(os.name != "posix", reason="sends signals")
 def test_a_history_of_many_cycles_hears_ctrl_c() -> None:
     done = subprocess.run(
         [sys.executable, "-c", ENDLESS], capture_output=True, text=True, check=False

@@ -22,7 +22,7 @@ def sweep_at(amplitude: xr.DataArray, inputs: dict[str, Any], **options: Any) ->
         name: xr.DataArray(values, dims=name) if np.ndim(values) else values
         for name, values in inputs.items()
     }
-    return sweep(
+    result = sweep(
         **choices(
             amplitude=amplitude.fillna(0.0),
             **given,
@@ -30,7 +30,8 @@ def sweep_at(amplitude: xr.DataArray, inputs: dict[str, Any], **options: Any) ->
             variables=["permanent_displacement"],
             **options,
         )
-    ).permanent_displacement
+    )
+    return result["permanent_displacement"]
 
 
 @pytest.mark.parametrize(
@@ -89,7 +90,7 @@ def test_newmark_closed_form() -> None:
             amplitude * (slid * math.cos(start) - math.sin(stop) + math.sin(start))
             - yielded * slid * slid / 2
         )
-        return travel / omega**2
+        return float(travel) / omega**2
 
     for target in (1e-4, 0.004, 0.02):
         expected = brentq(

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.path import Path as Outline
 
 import slipsweep
 from slipsweep.charts import kinds
@@ -45,9 +46,17 @@ def caption(figure: Figure) -> str:
 
 
 def inside(area: Any, cells: Any) -> Any:
-    """Which points a filled area covers, those on its edge among them."""
+    """Which points a filled area covers, those on its edge among them, where it is not clipped."""
     (path,) = area.get_paths()
-    return path.contains_points(cells, radius=1e-9) | path.contains_points(cells, radius=-1e-9)
+    covered = _contains(path, cells)
+    if area.get_clip_path() is not None:
+        region = area.get_clip_path().get_fully_transformed_path()
+        covered &= _contains(region, area.axes.transData.transform(cells))
+    return covered
+
+
+def _contains(path: Outline, points: Any) -> Any:
+    return path.contains_points(points, radius=1e-9) | path.contains_points(points, radius=-1e-9)
 
 
 def drawn_as(figure: Figure, text: str) -> list[Any]:

@@ -21,11 +21,10 @@ from slipsweep.errors import InputError
 from slipsweep.grid.inputs import Problem
 from slipsweep.grid.solvers import options_of
 from slipsweep.kernels.block import Cell
-from slipsweep.kernels.exact import workspace_of
-from slipsweep.kernels.history import History, fill_recorded_history
+from slipsweep.kernels.history import History, fill_history
 from slipsweep.model.options import Cycle, Mendez
 from slipsweep.model.variables import HISTORY
-from slipsweep.motion.cutting import wave_of_record
+from slipsweep.motion.cutting import path_of_record
 from slipsweep.motion.records import Record
 from slipsweep.motion.shaking import RESPONSES, TABLE, ShakingTest, check_channels
 from slipsweep.studies.friction import Floats, check_contact, noise_of
@@ -190,8 +189,7 @@ class Observation:
         """The model's block on that motion of the table."""
         record = self.record(wrong)
         options = options_of(Problem(self.model, record, Cycle()), wants_peak=True)
-        wave = wave_of_record.__wrapped__(record, 1.0)  # tried once: not kept in its cache
-        workspace = workspace_of(wave, keeps_log=True)
+        path = path_of_record.__wrapped__(record, 1.0)  # tried once: not kept in its cache
 
         def histories(parameters: Floats, times: Floats) -> dict[str, Floats]:
             onset, decay, drop = map(float, parameters)
@@ -199,7 +197,7 @@ class Observation:
                 math.tan(math.radians(self.theta)), self.mu_s, 1.0, onset, decay, drop, math.nan
             )
             table = np.empty((len(HISTORY), times.size))
-            fill_recorded_history(cell, options, wave, workspace, times, History(*table))
+            fill_history(cell, options, path, times, History(*table))
             return dict(zip(HISTORY, table, strict=True))
 
         return histories
@@ -207,10 +205,11 @@ class Observation:
     def _weighted(self, series: Mapping[str, Floats]) -> Floats:
         """The samples that count, channel by channel, in standard deviations; 0 of a channel that is not there."""
         none = np.zeros(self.test.times.size)
-        return (
+        weighted: Floats = (
             np.array([series.get(name, none) for name in self.channels])[self._counted]
             * self._scale
         )
+        return weighted
 
     def _by_channel(self, values: Floats) -> list[Floats]:
         return np.split(values, np.cumsum(self._counted.sum(axis=1))[:-1])
