@@ -37,7 +37,7 @@ def test_continuous_sliding_with_estimated_friction_is_not_for_design(
 ) -> None:
     block = ("--theta", "5", "--mu-s", "0.38", "--amplitude", amplitude, "--frequency", "1.8")
     text = printed(tmp_path, "simulate", *block, *given)
-    line = "not for design          continuous sliding with estimated friction\n"
+    line = "unsound                 continuous sliding with estimated friction: not for design\n"
     assert (line in text) == warned
     assert ("sliding mode            continuous\n" in text) == (amplitude == "0.9g")
 

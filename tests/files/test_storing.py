@@ -350,9 +350,7 @@ EDITS: dict[str, Callable[[xr.Dataset], xr.Dataset]] = {
     "packed": packed,
     "transposed": lambda table: table.transpose(*reversed(table.permanent_displacement.dims)),
     "codes as numbers": lambda table: table.assign(sliding_mode=table.sliding_mode.astype(float)),
-    "flags as numbers": lambda table: table.assign(
-        validity=table.validity.astype(float).where(table.validity != 0)
-    ),
+    "flags as numbers": lambda table: table.assign(validity=table.validity.astype(float)),
     "single precision": lambda table: table.astype("float32", keep_attrs=True).assign(
         validity=table.validity
     ),
