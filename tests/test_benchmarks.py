@@ -18,6 +18,7 @@ WRITES = {
     "report": ["report.md"],
     "speed_vs_error": ["speed_vs_error.csv", "engines.md", "speed_vs_error.png"],
     "records": ["records.md"],
+    "record_times": ["record_times.md"],
     "large_sweeps": ["large_sweeps.md"],
     "faults": ["faults.md"],
     "calibration": ["calibration.md"],

@@ -216,7 +216,7 @@ def cost_of(problem: Problem) -> int:
     records = motion if isinstance(motion, Suite) else (motion,)
     samples = max(record.times.size for record in records)
     if isinstance(problem.model, Newmark) and not steps:
-        return max(16, samples // 1024)
+        return max(8, samples // 4096)
     return max(64, samples // 8) * math.ceil(max(steps, 1) / STEPS_PER_SAMPLE)
 
 
