@@ -1,4 +1,4 @@
-"""Time of a million analyses of Newmark's block under recorded motions: ``python -m benchmarks.record_times``.
+"""Time of a million analyses of recorded motions: ``python -m benchmarks.record_times``.
 
 (ky, motion, scale) analyses of the ground motions that pySLAMMER ships, by slipsweep in one run, of
 a block that slides downslope only and of one that slides both ways; the paper's law, and
@@ -110,9 +110,9 @@ def main() -> None:
         "# Time of (ky, motion, scale) analyses\n\n"
         f"{measured_on(('numpy', 'numba', 'pyslammer'))} "
         "Made by `python -m benchmarks.record_times`.\n\n"
-        "Processor time of all threads together: core for core. The 18 motions that pySLAMMER ships, yield\n"
-        "coefficients (0.02 to 0.4) and scales (0.3 to 3) span the grid, solved in one run. Both ways: on a\n"
-        "level base. Seconds a sample count those of the motion, slid over or not.\n\n"
+        "Processor time of all threads together: core for core. The 18 motions that pySLAMMER ships,\n"
+        "yield coefficients (0.02 to 0.4) and scales (0.3 to 3) span the grid, solved in one run. Both\n"
+        "ways: on a level base. Seconds a sample count those of the motion, slid over or not.\n\n"
         f"{times}"
     )
 

@@ -2,7 +2,7 @@
 
 Every motion at ky = 0.1 g, against pySLAMMER's RigidAnalysis on the motion as it is and
 on the same straight lines sampled 4 and 16 times as finely, and against pyNewmarkDisp, as it is and
-with Newmark's braking put into its rule.  Writes records.md; `benchmarks.record_times` has the times.
+with Newmark's braking put into its rule.  Writes records.md.
 
 ``--slammer FILE`` compares with SLAMMER 1.1 itself: the table of its results that pySLAMMER is
 verified against, tests/verification_data/reference/SLAMMER_results.xlsx in pySLAMMER's repository,

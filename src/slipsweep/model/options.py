@@ -65,7 +65,8 @@ class Newmark(Choice):
     ----------
     sliding : {"downslope", "both"}
         Directions in which it slides.  With "both" its acceleration is −Üy,up while it slides
-        upslope (`upslope_yield_acceleration`); displacements may then be negative.
+        upslope (`upslope_yield_acceleration`); displacements may then be negative, and what counts
+        them, statistics and charts, takes |u|.
     g : float
         Gravity, m/s².
 
