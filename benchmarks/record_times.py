@@ -110,9 +110,10 @@ def main() -> None:
         "# Time of (ky, motion, scale) analyses\n\n"
         f"{measured_on(('numpy', 'numba', 'pyslammer'))} "
         "Made by `python -m benchmarks.record_times`.\n\n"
-        "Processor time of all threads together: core for core. The 18 motions that pySLAMMER ships,\n"
-        "yield coefficients (0.02 to 0.4) and scales (0.3 to 3) span the grid, solved in one run. Both\n"
-        "ways: on a level base. Seconds a sample count those of the motion, slid over or not.\n\n"
+        "Processor time of all threads together: core for core. The 18 motions that pySLAMMER\n"
+        "ships, yield coefficients (0.02 to 0.4) and scales (0.3 to 3) span the grid, solved in\n"
+        "one run. Both ways: on a level base. Seconds a sample count those of the motion, slid\n"
+        "over or not.\n\n"
         f"{times}"
     )
 
