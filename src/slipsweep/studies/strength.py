@@ -213,7 +213,9 @@ def plan_strength(
     wanted = ["permanent_displacement"]
     plan = plans.plan_sweep(planned, excitation=excitation, model=model, variables=wanted)
     dropped = {of, "mu_s", *absolute}
-    if {"displacement_amplitude", "frequency"} & {*absolute}:
+    if "displacement_amplitude" in plan.coords and (
+        {"displacement_amplitude", "frequency"} & {*absolute}
+    ):
         dropped.add("amplitude")  # A = ω²d of no value is nobody's amplitude
     coords = {name: one for name, one in plan.coords.items() if name not in dropped}
     source = plan.attrs["friction_inputs"].partition(";")[2]
