@@ -35,7 +35,7 @@ def test_motions_and_their_band_over_the_amplitude(strengths: xr.Dataset) -> Non
     for edge, expected in zip(named(figure, "edge"), (low, high), strict=True):
         np.testing.assert_array_equal(edge.get_ydata(), expected)
     assert legend(figure) == ["median", "16 to 84 %", "a motion"]
-    assert "shares of 2 polarity x 8 motion stay within" in caption(figure)
+    assert "quantiles of the required strength over 2 polarity x 8 motion." in caption(figure)
 
 
 def test_each_displacement_has_a_panel(strengths: xr.Dataset) -> None:

@@ -170,6 +170,18 @@ def test_strength_falls_with_the_displacement_and_grows_with_the_amplitude() -> 
     assert bool((required.diff("amplitude") > 0.0).all())
 
 
+def test_level_base_has_no_polarity() -> None:
+    """Turned shaking moves a block that slides both ways as far to the other side."""
+    pulses = Record.sampled([0.0, -3.0, -1.0, 0.5, 1.0, 0.0], 0.1)
+    strengths = required_strength(
+        [1e-4, 0.02], theta=0.0, excitation=pulses, polarity="both", model=BOTH
+    )
+    assert (strengths.required_status == StrengthStatus.SOLVED).all()
+    required = strengths.required_yield_coefficient
+    np.testing.assert_allclose(required.sel(polarity=1), required.sel(polarity=-1), rtol=1e-11)
+    assert float(required.max()) > 2.0 / G
+
+
 def test_friction_of_a_yield_coefficient() -> None:
     """Coulomb: ky = tan(φ − θ)."""
     given: dict[str, Any] = {"amplitude": 4.0, "frequency": 1.0, "theta": [0.0, 8.0, 30.0]}

@@ -179,7 +179,7 @@ def _required_text(data: xr.Dataset, has_band: bool) -> str:
         runs = str(data.attrs.get("pooled", ""))
         if "samples" in data.attrs:
             runs = f"{runs} x {data.attrs['samples']} samples".removeprefix(" x ")
-        texts.append(f"Median and band: strengths with which these shares of {runs} stay within.")
+        texts.append(f"Median and band: quantiles of the required strength over {runs}.")
         always = int(data["always_within_count"].max())
         never = int(data["never_within_count"].max())
     else:

@@ -236,7 +236,7 @@ def _summarize_strengths(table: "xr.Dataset", name: str) -> None:
     runs = str(table.attrs.get("pooled", ""))
     if "samples" in table.attrs:
         runs = f"{runs} x {table.attrs['samples']} samples".removeprefix(" x ")
-    echo(f"{name} with which a share of {runs} stays within (PGA in g):")
+    echo(f"quantiles of {name} over {runs} (PGA in g):")
     echo(rows.head(_MOST_POINTS).to_string(float_format="{:.4g}".format, na_rep="none"))
     if len(points) > _MOST_POINTS:
         echo(f"and {len(points) - _MOST_POINTS} grid points more")

@@ -29,9 +29,10 @@ if TYPE_CHECKING:
 
 TITLE = "Yield coefficient that published equations require for a tolerable displacement"
 
-#: ky/PGA of the scan, through ln(r/(1 − r)), and the halvings of the step that holds the crossing.
+#: ky/PGA of the scan, through ln(r/(1 − r)), and how often the step that holds the crossing is cut
+#: into as many parts.
 _RATIOS = 1.0 / (1.0 + np.exp(-np.linspace(-9.0, 14.0, 512)))
-_HALVINGS = 50
+_NARROWINGS = 6
 
 _RESULT = "required_yield_coefficient_quantile"
 
@@ -149,18 +150,18 @@ def strength_by(
         dims = by_equation.median.dims
         return xr.DataArray(by_equation.quantile(share), dims=dims) > target
 
-    scan = xr.DataArray(_RATIOS, dims="scan")
-    above = exceeds(scan)
-    # the last place that exceeds it, and the next
-    last = _RATIOS.size - 1 - above.isel(scan=slice(None, None, -1)).argmax("scan")
-    low = xr.DataArray(_RATIOS[last.values], dims=last.dims)
-    high = xr.DataArray(_RATIOS[np.minimum(last.values + 1, _RATIOS.size - 1)], dims=last.dims)
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        over = exceeds(middle)
-        low = middle.where(over, low)
-        high = high.where(over, middle)
-    ratio = high.where(above.any("scan"), 0.0)
+    def step(ratios: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]:
+        """Return the last ratio that exceeds the displacement, the next, and if there is one."""
+        above = exceeds(ratios)
+        last = ratios.sizes["scan"] - 1 - above.isel(scan=slice(None, None, -1)).argmax("scan")
+        following = np.minimum(last + 1, ratios.sizes["scan"] - 1)
+        return ratios.isel(scan=last), ratios.isel(scan=following), above.any("scan")
+
+    parts = xr.DataArray(np.linspace(0.0, 1.0, _RATIOS.size), dims="scan")
+    low, high, crosses = step(xr.DataArray(_RATIOS, dims="scan"))
+    for _ in range(_NARROWINGS):
+        low, high, _any = step(low + (high - low) * parts)
+    ratio = high.where(crosses, 0.0)
     inside = estimate(ratio.where(ratio > 0.0, _RATIOS[0])).in_range
     return ratio * pga, inside & (ratio > 0.0)
 

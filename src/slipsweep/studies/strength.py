@@ -109,8 +109,8 @@ def required_strength(
 
         Under a suite, over all motions and polarities:
 
-        - ``required_…_quantile``, dimension `quantile`: the strength with which this share of them
-          stays within.  It is infinite where too many are never within.
+        - ``required_…_quantile``, dimension `quantile`: the strength that is enough for this share
+          of them, linear between two of them.  It is infinite where too many are never within.
         - `always_within_count` and `never_within_count`.
 
         With uncertain inputs there are only these, over all samples (of all motions).
@@ -309,7 +309,7 @@ class StrengthPlan(plans.Plan):
         lengths = self.sizes | self.pooled | {"quantile": self.quantiles.size}
         if "always_within_count" in self.results:
             about = variables.STATISTIC_COORDINATES["quantile"] | {
-                "long_name": "share of the motions or samples that stay within"
+                "long_name": "share of the motions or samples that need no more"
             }
             coords["quantile"] = xr.Variable("quantile", self.quantiles, about)
         results = {}
