@@ -1,4 +1,4 @@
-"""Required strengths: solved forward again, closed forms, scaling laws, suites, samples, both ways."""
+"""Required strengths: solved forward, closed forms, scaling laws, suites, samples, both ways."""
 
 import math
 from typing import Any
@@ -11,6 +11,7 @@ import slipsweep
 from slipsweep import InputError, Newmark, Record, Sine, Suite, required_strength, sweep
 from slipsweep.grid.inputs import Inputs
 from slipsweep.model.variables import StrengthStatus
+from slipsweep.studies.sampling import Sampling
 from slipsweep.studies.strength import plan_strength
 from tests.support.made_up_records import few_pulses
 
@@ -151,7 +152,7 @@ def test_strength_towards_zero_under_a_sine_from_rest() -> None:
 
 
 def test_frequency_and_amplitude_only_scale() -> None:
-    """u(ky, A, f) = A/f² · U(ky/A): half the displacement at twice A and f is twice the strength."""
+    """u = A/f² · U(ky/A): half the displacement at twice A and f is twice the strength."""
     for model in (Newmark(), BOTH):
         theta = _theta(model)
         for excitation in ("sine", "triangle"):
@@ -394,6 +395,28 @@ def test_quantile_is_the_probability_of_staying_within() -> None:
         )
         exceeded = found.exceedance_probability.values.ravel()
         np.testing.assert_allclose(exceeded, [0.7, 0.16], atol=1.0 / (3 * 512))
+
+
+def test_samples_of_a_sweep_file_with_sobol_indices() -> None:
+    """The further draws that indices take are left out, and no attribute speaks of them."""
+    sampling = Sampling(
+        {"amplitude": FACTOR},
+        samples=64,
+        method="sobol",
+        seed=1,
+        quantiles=[0.5],
+        thresholds=[0.1],
+        correlation=[],
+        g=G,
+        sensitivity=True,
+    )
+    inputs = Inputs(amplitude=3.0, frequency=1.0)
+    found = plan_strength(0.05, inputs, sampling=sampling).solve()
+    draws = sampling.draws["amplitude"][:64]
+    expected = required_strength(0.05, 3.0 * draws, 1.0).required_yield_coefficient
+    median = found.required_yield_coefficient_quantile.item()
+    assert median == pytest.approx(float(expected.median()), rel=1e-12)
+    assert "sensitivity" not in found.attrs
 
 
 # ------------------------------------------------------------------ published equations beside

@@ -1,4 +1,4 @@
-"""Charts of what a tolerable displacement allows: limit amplitudes, required strengths, annual rates."""
+"""Charts of what a displacement allows: limit amplitudes, required strengths, annual rates."""
 
 from dataclasses import replace
 
@@ -173,7 +173,7 @@ def _draw_required(sheet: Sheet, panel: Panel, name: str) -> None:
 
 
 def _required_text(data: xr.Dataset, has_band: bool) -> str:
-    """Return what the band is of, and the motions or samples that no strength or every one holds."""
+    """Return what the band is of, and how many no strength holds, or every one."""
     texts = []
     if has_band:
         runs = str(data.attrs.get("pooled", ""))

@@ -36,9 +36,9 @@ def write_outputs(
     look: Mapping[str, Any] | None = None,
     **texts: Callable[[], str],
 ) -> None:
-    """Write each output: the text of its ending, a netCDF file, or the chart with the options `look`.
+    """Write each output: the text of its ending, a netCDF file, or the chart.
 
-    The record that is the input goes into the netCDF file.
+    The record that is the input goes into the netCDF file; `look` has options of the chart.
     """
     from slipsweep.files import netcdf
 

@@ -1,4 +1,4 @@
-"""`slipsweep limit`: the amplitude, or the strength, at which a tolerable displacement is reached."""
+"""`slipsweep limit`: the amplitude, or the strength, for a tolerable displacement."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -216,7 +216,7 @@ def _print_strengths(table: "xr.Dataset", of: str) -> None:
 
 
 def _summarize_strengths(table: "xr.Dataset", name: str) -> None:
-    """Print the quantiles of a suite or of samples at every grid point, and each motion's strength."""
+    """Print quantiles of a suite or of samples at every grid point, and each motion's strength."""
     import numpy as np
     import pandas as pd
 

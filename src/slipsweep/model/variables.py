@@ -180,7 +180,7 @@ class StrengthStatus(_Status):
     SOLVED = 0, "the displacement at the required strength is the tolerable one"
     ALWAYS_WITHIN = (
         1,
-        "not exceeded at any strength, as where nothing slides: that of static equilibrium is enough",
+        "not exceeded at any strength, as where nothing slides: static equilibrium is enough",
     )
     NEVER_WITHIN = 2, "exceeded at every strength (no required strength)"
 

@@ -119,8 +119,8 @@ def limit_amplitude(
           numbers, with and without a change of sliding mode), 3 after_gap (no value just below), 4
           not_reached, 5 invalid (no value anywhere).
         - `permanent_displacement`, m, and `sliding_mode` (under a record the counts of slips and pulses) at the
-          limit; more than `displacement` where a discontinuity of the model sets the limit.  Of a block that
-          slides both ways also `largest_displacement` and `smallest_displacement`.
+          limit; more than `displacement` where a discontinuity of the model sets the limit.  Of a
+          block that slides both ways also `largest_displacement` and `smallest_displacement`.
         - `validity` at the limit or, where there is none, at `maximum_amplitude`.
 
     Raises
@@ -242,8 +242,8 @@ def check_displacement(displacement: Any) -> xr.Variable:
     dims = getattr(lengths, "dims", ("displacement",) * values.ndim)
     if not values.size or len({*dims}) < values.ndim:
         raise InputError(
-            f"displacement = {parameters.shown(lengths)}: must be a number, a list, or a DataArray, "
-            "not empty"
+            f"displacement = {parameters.shown(lengths)}: must be a number, a list, or a DataArray"
+            ", not empty"
         )
     return xr.Variable(dims, values, variables.TOLERABLE_DISPLACEMENT)
 

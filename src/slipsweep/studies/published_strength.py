@@ -1,4 +1,4 @@
-"""Published equations solved for the yield coefficient, beside the strengths that a suite requires."""
+"""Published equations solved for ky, beside the strengths that a suite requires."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -44,7 +44,7 @@ def published_strength(
     magnitude: float | None = None,
     quantiles: float | Sequence[float] | np.ndarray = QUANTILES,
 ) -> xr.Dataset:
-    """Yield coefficients that published equations require, at the grid points of required strengths.
+    """Yield coefficients that published equations require, at the points of required strengths.
 
     The equations are solved for ky: at it their quantile of the displacement is the tolerable one.
     What they were fitted to is not this block: the attribute ``conditions`` names it.
@@ -131,7 +131,7 @@ def published_strength(
 def strength_by(
     strengths: xr.Dataset, name: str, magnitude: float | None, share: float
 ) -> tuple[xr.DataArray, xr.DataArray]:
-    """Return ky at which an equation's quantile is the displacement, and if its inputs are in range.
+    """Return ky at which an equation's quantile is the displacement, and if it is in range.
 
     The largest such ky, if there are several: above it the quantile stays within.
     """
@@ -169,7 +169,7 @@ def strength_by(
 def strength_table(
     strengths: xr.Dataset, equations: Sequence[str], magnitude: float | None = None
 ) -> "pd.DataFrame":
-    """Return required ky in rows: of the result's own suite and of each equation at each grid point.
+    """Return required ky in rows: of the suite and of each equation, at each grid point.
 
     Columns: the axes, ``ky by``, the quantiles, and ``range``, which is "outside" where an
     equation is extrapolated.

@@ -1,4 +1,4 @@
-"""`required_strength`: the smallest strength at which Newmark's block stays within a displacement."""
+"""`required_strength`: the smallest strength that keeps Newmark's block within a displacement."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -18,7 +18,7 @@ from slipsweep.studies import criterion, datasets
 from slipsweep.studies.datasets import Values
 from slipsweep.studies.limits import check_displacement
 from slipsweep.studies.sampling import Floats, Sampling, check_increasing
-from slipsweep.studies.strength_roots import yield_accelerations
+from slipsweep.studies.strength_roots import SCAN_MEMORY, yield_accelerations
 from slipsweep.studies.suite_statistics import QUANTILES, SUITE, THRESHOLDS
 from slipsweep.studies.uncertainty import check_drawn
 
@@ -33,9 +33,9 @@ _ANY = 0.5
 #: Evaluations of the kernel for each required strength, about.
 _EVALUATIONS = 6.0
 
-#: Required strengths that are solved together; of blocks that slide both ways each has a scan.
-_TOGETHER = 1_000_000
-_SCANNED_TOGETHER = 32_768
+#: Required strengths that are solved together, and bytes that each of them takes.
+_TOGETHER = 262_144
+_CELL_MEMORY = 300
 
 #: The dimension of the draws; no result has it.
 _DRAW = "draw of the uncertain inputs"
@@ -102,8 +102,8 @@ def required_strength(
     Dataset
         Dimensions amplitude, frequency, then others, displacement, polarity and motion last:
 
-        - `required_yield_coefficient`, `required_mu_s` or `required_phi` (degrees), of every motion;
-          NaN where there is none.
+        - `required_yield_coefficient`, `required_mu_s` or `required_phi` (degrees), of every
+          motion; NaN where there is none.
         - `required_status`: 0 solved, 1 always_within (also where nothing slides: ky is 0, μs is
           tan θ), 2 never_within.
 
@@ -229,12 +229,13 @@ def plan_strength(
     if sampling is not None:
         sampling.check_draws(coords)
         attrs |= sampling.attributes
+        attrs.pop("sensitivity", None)
     shares = check_increasing("quantiles", quantiles, "quantile")
     return StrengthPlan(of, problem, coords | {"displacement": target}, attrs, sampling, shares)
 
 
 class StrengthPlan(plans.Plan):
-    """The required strengths of a grid, each motion's along `pooled` dimensions, and their quantiles."""
+    """Required strengths of a grid, each motion's along `pooled` dimensions, and quantiles."""
 
     def __init__(
         self,
@@ -280,16 +281,15 @@ class StrengthPlan(plans.Plan):
             self.results["never_within_count"] = ()
         self.names = tuple(self.results)
         plans.check_dimensions(sizes, coords, (*self.names, "quantile"))
-        together = _TOGETHER
-        if options.slides_both_ways(problem.model):
-            together = _SCANNED_TOGETHER
         #: How many points are solved together.
-        self.points = max(together // self.runs, 1)
+        self.points = max(_TOGETHER // self.runs, 1)
         # as of any plan
         self.together = ()
         self.cost = solvers.cost_of(problem) * self.runs * _EVALUATIONS
         self.cell_memory = 0
-        self.memory = 200 * max(together, self.runs) + solvers.memory_of(problem)
+        self.memory = _CELL_MEMORY * max(_TOGETHER, self.runs) + solvers.memory_of(problem)
+        if options.slides_both_ways(problem.model):
+            self.memory += SCAN_MEMORY
 
     @property
     def cells(self) -> int:
@@ -351,7 +351,11 @@ class StrengthPlan(plans.Plan):
         drawn: Mapping[str, xr.Variable] = {}
         if self.sampling is not None:
             sizes[_DRAW] = self.draws
-            drawn = {name: xr.Variable(_DRAW, draws) for name, draws in self.sampling.draws.items()}
+            # of draws for Sobol indices, which are not computed, the first are the samples
+            drawn = {
+                name: xr.Variable(_DRAW, draws[: self.draws])
+                for name, draws in self.sampling.draws.items()
+            }
             for name, draws in drawn.items():
                 if name != self.of:
                     about = self.sampling.distributions[name]

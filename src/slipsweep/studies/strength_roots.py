@@ -18,6 +18,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from slipsweep.grid import engine, threads
+from slipsweep.grid.chunks import grid_chunks
 from slipsweep.grid.engine import Request
 from slipsweep.grid.inputs import Problem, grid_sizes
 from slipsweep.grid.solvers import cost_of
@@ -50,6 +51,10 @@ _MOST_EVALUATIONS = 200
 #: Cells that are solved together: their arrays stay in the cache.
 _TOGETHER = 65536
 
+#: Cells that are solved together where each may need a scan of its own, and bytes that this takes.
+_SCANNED_TOGETHER = 4096
+SCAN_MEMORY = 14 * 8 * _BLOCK_STEPS * _SCANNED_TOGETHER
+
 #: A maximum of the scan above this part of the displacement may hide a higher one: the steps beside
 #: it are cut into parts.
 _NEAR = 0.8
@@ -67,11 +72,14 @@ def yield_accelerations(request: Request) -> tuple[Floats, NDArray[np.int8]]:
     strength = xr.Variable(dims, np.empty(shape))
     status = xr.Variable(dims, np.empty(shape, np.int8))
     for where, part in engine.motions(request):
-        part_shape = tuple(part.sizes.values())
-        values, codes = _solve_part(part)
-        strength[where] = values.reshape(part_shape)
-        status[where] = codes.reshape(part_shape)
-        request.count(part.cells)
+        most = part.cells if _scales_with_amplitude(part) else _SCANNED_TOGETHER
+        for chunk in grid_chunks(part.sizes, most):
+            piece = part.part(chunk)
+            piece_shape = tuple(piece.sizes.values())
+            values, codes = _solve_part(piece)
+            strength[chunk | where] = values.reshape(piece_shape)
+            status[chunk | where] = codes.reshape(piece_shape)
+            request.count(piece.cells)
     return strength.values, status.values
 
 
@@ -183,7 +191,7 @@ class Scan:
         self.highest = np.maximum.accumulate(self.displacements[:, ::-1], axis=1)[:, ::-1]
 
     def displacement(self, block: Indices, x: Floats) -> Floats:
-        """Return the displacement (the largest |u| of a block that slides both ways) at places x."""
+        """Return displacements at places x; of a block that slides both ways the largest |u|."""
         inputs = dict(self.motion)
         factor: Floats | float = 1.0
         for name, values in self.blocks.items():
@@ -273,7 +281,7 @@ class Scan:
         return np.asarray(1.0 / (1.0 + np.exp(-solution)))
 
     def _hidden(self, block: Indices, target: Floats, passed: Indices) -> tuple[Indices, Bracket]:
-        """Return cells whose displacement is passed beside a maximum of the scan, above `passed`."""
+        """Return cells that pass their displacement beside a maximum of the scan above `passed`."""
         inner = self.displacements[:, 1:-1]
         peaks = (inner > self.displacements[:, :-2]) & (inner >= self.displacements[:, 2:])
         near = peaks[block] & (inner[block] > _NEAR * target[:, np.newaxis])

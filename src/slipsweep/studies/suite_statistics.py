@@ -304,7 +304,7 @@ def labels_along(data: xr.Dataset, dim: Hashable, factor: float = 1.0) -> list[s
 def point_names(
     data: xr.Dataset, sizes: Mapping[Any, int], factors: Mapping[Any, float] | None = None
 ) -> list[str]:
-    """Names of the points of a grid, in order: ``theta = 5, mu_s = 0.3``; numbers times `factors`."""
+    """Names of the points of a grid: ``theta = 5, mu_s = 0.3``; numbers times `factors`."""
     along = (
         [f"{dim} = {label}" for label in labels_along(data, dim, (factors or {}).get(dim, 1.0))]
         for dim in sizes
