@@ -85,7 +85,7 @@ def published_strength(
     >>> design = slipsweep.required_strength("50mm", amplitude=3.924, excitation=suite)
     >>> beside = slipsweep.published_strength(design, "jibson-2007", quantiles=[0.5, 0.84])
     >>> beside.required_yield_coefficient_quantile.values.round(3)
-    array([[0.109, 0.171]])
+    array([[0.109, 0.169]])
     """
     if not isinstance(strengths, xr.Dataset):
         raise InputError(f"strengths = {shown(strengths)}: must be a Dataset")

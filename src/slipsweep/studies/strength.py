@@ -132,7 +132,7 @@ def required_strength(
     >>> suite = slipsweep.read_suite("sweeps/data/suite/*_H1.AT2")
     >>> design = slipsweep.required_strength("50mm", amplitude=[2.0, 4.0], excitation=suite)
     >>> design.required_yield_coefficient_quantile.sel(quantile=0.84).values.round(3)
-    array([0.085, 0.208])
+    array([0.089, 0.206])
     """
     inputs = grid_inputs.Inputs(
         theta=theta,
