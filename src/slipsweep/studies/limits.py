@@ -95,7 +95,7 @@ def limit_amplitude(
     of mode.  A peak narrower than a part of a step can be missed.  Under a record the amplitude is
     that peak ground acceleration to which it is scaled, and the scan has both sides of every
     amplitude at which one of its 128 highest pulses begins to count, or changes its mode.  Of a
-    block that slides both ways the largest |u| over time is to reach the displacement.
+    block that slides both ways the largest ``|u|`` over time is to reach the displacement.
 
     Parameters
     ----------

@@ -74,7 +74,7 @@ def required_strength(
     displacement to 1e-9 of itself.
 
     The permanent displacement of a block that slides downslope falls with its strength.  A block
-    that slides both ways stays within by the largest |u| over time, which may rise with the
+    that slides both ways stays within by the largest ``|u|`` over time, which may rise with the
     strength: the required strength is then the one above which no strength of a scan exceeds the
     displacement.  A peak that is narrower than a step of the scan can be missed.
 
