@@ -155,7 +155,7 @@ def simulate(
     for name in variables.SIGNED:
         if name in table:
             echo(f"{name.replace('_', ' '):<23} {table[name].item():.6g} m")
-    if {*variables.DEFAULT_EXTREMES} <= {*table}:
+    if {*variables.EXTREMES} <= {*table}:
         extent = table["largest_displacement"] - table["smallest_displacement"]
         echo(f"{'clearance':<23} {extent.item():.6g} m")
     echo(f"peak relative velocity  {table['peak_relative_velocity'].item():.6g} m/s")

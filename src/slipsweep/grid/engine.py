@@ -38,7 +38,7 @@ _MOST_TILE = 65536
 _POWERS = {
     "permanent_displacement": 2,
     "newmark_displacement": 2,
-    **dict.fromkeys(known.EXTREMES, 2),
+    **dict.fromkeys(known.BOTH_WAYS, 2),
     "peak_relative_velocity": 1,
 }
 
@@ -134,7 +134,7 @@ def amplitudes(request: Request) -> Variables:
     results = request.results()
     for where, part in motions(request):
         for one in results.values():
-            one[where] = amplitude_of(part.problem, part.inputs)
+            one[where] = motion_factor(part.problem, part.inputs)
         part.count(part.cells)
     return results
 
@@ -169,7 +169,9 @@ def cell_inputs(problem: Problem, inputs: Mapping[str, Any]) -> dict[str, Any]:
     Under a record A is its factor.  A block that slides both ways also has its upslope yield
     acceleration.
     """
-    given = {**inputs, "amplitude": amplitude_of(problem, inputs)}
+    given = dict(inputs)
+    if isinstance(problem.excitation, Record) or "displacement_amplitude" in inputs:
+        given["amplitude"] = motion_factor(problem, inputs)
     if "yield_coefficient" in inputs:
         given["yield_acceleration"] = inputs["yield_coefficient"] * problem.model.g
     if "theta" in inputs:
@@ -180,8 +182,8 @@ def cell_inputs(problem: Problem, inputs: Mapping[str, Any]) -> dict[str, Any]:
     return fields
 
 
-def amplitude_of(problem: Problem, inputs: Mapping[str, Any]) -> Any:
-    """Return A, m/s², or the factor on the acceleration of a record."""
+def motion_factor(problem: Problem, inputs: Mapping[str, Any]) -> Any:
+    """Return A of a waveform, m/s², or the factor on the acceleration of a record."""
     if isinstance(record := problem.excitation, Record):
         return strength_factor(record.times, record.acceleration, inputs)
     if "displacement_amplitude" in inputs:

@@ -165,12 +165,6 @@ def slides_both_ways(model: Model) -> bool:
     return isinstance(model, Newmark) and model.sliding == "both"
 
 
-def check_one_way(name: str, sliding: object) -> None:
-    """Refuse what takes displacements in one direction only."""
-    if sliding == "both":
-        raise InputError(f"{name}: not allowed with sliding = 'both', only with 'downslope'")
-
-
 Solver = Cycle | Step
 
 MODELS: Family[Model] = Family("model", "friction", (Mendez, Newmark), "mendez", "model")
