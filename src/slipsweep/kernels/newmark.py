@@ -193,7 +193,8 @@ def root_of_speed(
         else:
             high = tau
         new = tau - value / rate
-        if not low <= new <= high:
+        # at an end that has been tried before, rounding would send it to and fro
+        if new != tau and not low < new < high:
             new = 0.5 * (low + high)
         step = abs(new - tau)
         tau = new
