@@ -179,6 +179,21 @@ def test_agreement_with_steps(motion: Any) -> None:
         assert float((apart / (largest + 1e-9)).max()) < 1e-7, name
 
 
+def test_a_slide_upslope_that_ends_where_it_begins() -> None:
+    """|Üg| falls through Üy,up just where the block turns; rounding sent the search for the stop astray."""
+    block: dict[str, Any] = {
+        "theta": 3.0,
+        "mu_s": 0.3,
+        "amplitude": 7.003112822853185,
+        "frequency": 1.0 / (2.0 * pi),
+        "yield_acceleration": 0.012776358477365565,
+        "model": BOTH,
+    }
+    found = sweep(**block).permanent_displacement
+    stepped = sweep(**block, solver=Step("simpson", steps_per_cycle=8192)).permanent_displacement
+    assert float(found) == pytest.approx(float(stepped), rel=1e-9)
+
+
 @pytest.mark.parametrize("motion", MOTIONS)
 @pytest.mark.parametrize("model", [Newmark(), BOTH])
 def test_history_ends_where_the_sweep_does(motion: Any, model: Newmark) -> None:
