@@ -65,7 +65,8 @@ class Newmark(Choice):
     ----------
     sliding : {"downslope", "both"}
         Directions in which it slides.  With "both" its acceleration is −Üy,up while it slides
-        upslope (`upslope_yield_acceleration`); displacements may then be negative.
+        upslope (`upslope_yield_acceleration`); displacements may then be negative, and what counts
+        them, statistics and charts, takes |u|.
     strength : {"constant", "weakening", "rate"}
         Friction while it slides: μs; μr + (μs − μr) max(0, 1 − s/D), which falls with the slip s =
         ∫|v|dt (`residual_mu` μr, `weakening_distance` D); or μf − (μf − μs) e^(−a|v|), which depends
@@ -179,12 +180,6 @@ def changing_strength(model: Model) -> str | None:
     if isinstance(model, Newmark) and model.strength != "constant":
         return model.strength
     return None
-
-
-def check_one_way(name: str, sliding: object) -> None:
-    """Refuse what takes displacements in one direction only."""
-    if sliding == "both":
-        raise InputError(f"{name}: not allowed with sliding = 'both', only with 'downslope'")
 
 
 Solver = Cycle | Step
