@@ -27,6 +27,7 @@ WRITES = {
     "limits": ["limits.md"],
     "compiling": ["compiling.md"],
     "both_ways": ["both_ways.md"],
+    "strength": ["strength.md"],
 }
 
 #: Half a minute of processes, clusters and compilation.

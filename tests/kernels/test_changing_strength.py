@@ -437,3 +437,47 @@ def test_solver_auto_is_simpsons_rule() -> None:
     assert found.attrs["strength"] == "rate"
     assert "friction" in found.attrs["friction_inputs"]
     assert slipsweep.Newmark(strength="rate") == RATE
+
+
+# ------------------------------------------------------------------ studies
+
+
+@KINDS
+@WAYS
+def test_a_history_ends_where_the_sweep_does(strength: Any, sliding: Any) -> None:
+    """It goes on to the stop after the shaking; the slip it shows is that of the results."""
+    pulse = record_of([0.0, 0.4], [6.0, 6.0])
+    laws: dict[str, Any] = {
+        "weakening": {"residual_mu": 0.1, "weakening_distance": 0.5},
+        "rate": {"fast_mu": 0.1, "rate_constant": 5.0},
+    }
+    model = Newmark(sliding=sliding, strength=strength)
+    history = slipsweep.simulate(0.0, 0.3, **laws[strength], excitation=pulse, model=model)
+    displacements = history.relative_displacement
+    assert displacements[-1] == pytest.approx(float(history.permanent_displacement), rel=1e-9)
+    assert history.relative_velocity[-1] == 0.0
+    assert history.time[-1] > 0.8
+    velocities = history.relative_velocity
+    areas = 0.5 * (velocities.values[1:] + velocities.values[:-1]) * np.diff(history.time)
+    assert areas.sum() == pytest.approx(float(displacements[-1]), rel=0.1)
+
+
+def test_samples_are_solved_at_each_frequency() -> None:
+    """One draw of no width is the sweep's own cell; draws that do not stop exceed every length."""
+    given: dict[str, Any] = {"frequency": [0.5, 2.0], "weakening_distance": 0.05}
+    block = BLOCK | given | {"model": WEAKENING}
+    exact = sweep(**block, residual_mu=0.2).permanent_displacement.values
+    narrow = {"residual_mu": {"distribution": "uniform", "loc": 0.2, "scale": 1e-9}}
+    found = slipsweep.sample(**block, uncertain=narrow, samples=16, quantiles=[0.5])
+    np.testing.assert_allclose(found.displacement_quantile.values[:, 0], exact, rtol=1e-6)
+    weak = {"residual_mu": {"distribution": "uniform", "loc": 0.03, "scale": 0.02}}
+    endless = slipsweep.sample(**block, uncertain=weak, samples=16, thresholds=[1e3])
+    assert (endless.exceedance_probability == 1.0).all()
+
+
+def test_limit_amplitudes_are_those_of_the_sweep() -> None:
+    given: dict[str, Any] = {**PARTS["weakening"], "model": WEAKENING}
+    limit = slipsweep.limit_amplitude(0.1, 4.0, 0.3, [1.0, 2.0], **given)
+    for frequency, amplitude in zip([1.0, 2.0], limit.limit_amplitude.values, strict=True):
+        block = {"theta": 4.0, "mu_s": 0.3, "amplitude": float(amplitude), "frequency": frequency}
+        assert displacement(**block, **given) == pytest.approx(0.1, rel=1e-9)

@@ -63,6 +63,8 @@ HATCHES = {
     Validity.FLEXIBLE_BLOCK: "++",
     Validity.UPSLOPE: "OO",
     Validity.NEAR_MODE_LIMIT: "..",
+    Validity.MAY_NOT_STOP: "||",
+    Validity.NOT_AT_REST: "xxx",
 }
 
 #: Hatching of displacements that have a trend which no block has.

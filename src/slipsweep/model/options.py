@@ -196,7 +196,7 @@ STRENGTH_TEXT = {
 }
 
 #: Steps where the strength changes while the block slides: the largest error of 1,000 random cells
-#: was 1e-7 of u, the median 1e-11 (python -m benchmarks.strength).
+#: was 2e-7 of u, the median 8e-11 (python -m benchmarks.strength).
 STRENGTH_STEPS = Step("simpson", 512)
 
 

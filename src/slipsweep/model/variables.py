@@ -159,6 +159,9 @@ def flags_of(kind: FlagKind) -> Validity:
 
 VALUELESS, CAUTIONS, NOTES = (flags_of(kind) for kind in FlagKind)
 
+#: Flags of blocks without a value that slide for good: their displacement exceeds every length.
+ENDLESS = Validity.STATICALLY_UNSTABLE | Validity.NOT_AT_REST
+
 
 class _Status(IntEnum):
     """A code with a `text` of one line for people."""
