@@ -77,7 +77,8 @@ class Block:
         block: dict[str, Any] = {"theta": self.theta, **self.friction, "model": self.model}
         wave = slipsweep.Sine(cycles=CYCLES)
         found = slipsweep.sweep(**block, amplitude=amplitude, frequency=frequency, excitation=wave)
-        return found.permanent_displacement.reset_coords(drop=True)
+        moved: xr.DataArray = found.permanent_displacement.reset_coords(drop=True)
+        return moved
 
 
 def blocks() -> list[Block]:
@@ -195,7 +196,7 @@ def line_of(kind: str, rows: list[dict[str, Any]], which: int) -> list[object]:
 def draw(kinds: dict[str, list[dict[str, Any]]]) -> Figure:
     """Draw the ratios: a column a kind, a strip and its median and 5 to 95 % for each predictor."""
     figure = Figure(figsize=(9.0, 3.6), layout="constrained")
-    axes = figure.subplots(1, len(kinds), sharey=True)
+    axes = figure.subplots(1, len(kinds), sharey=True, squeeze=False)[0]
     generator = np.random.default_rng(0)
     for axis, (kind, rows) in zip(axes, kinds.items(), strict=True):
         axis.axvline(1.0, color="0.6", linewidth=0.8)
@@ -221,8 +222,11 @@ def main() -> None:
     jobs = list(enumerate(blocks()))
     if given.tiny:
         jobs = jobs[1:2]
-    with ProcessPoolExecutor(cores(), get_context("spawn")) as pool:
-        rows = [row for part in pool.map(predicted, jobs) for row in part]
+        parts = [predicted(job) for job in jobs]
+    else:
+        with ProcessPoolExecutor(cores(), get_context("spawn")) as pool:
+            parts = list(pool.map(predicted, jobs))
+    rows = [row for part in parts for row in part]
     kinds: dict[str, list[dict[str, Any]]] = {}
     for row in rows:
         kinds.setdefault(row["kind"], []).append(row)
