@@ -481,3 +481,21 @@ def test_limit_amplitudes_are_those_of_the_sweep() -> None:
     for frequency, amplitude in zip([1.0, 2.0], limit.limit_amplitude.values, strict=True):
         block = {"theta": 4.0, "mu_s": 0.3, "amplitude": float(amplitude), "frequency": frequency}
         assert displacement(**block, **given) == pytest.approx(0.1, rel=1e-9)
+
+
+def test_a_limit_is_where_the_block_no_longer_stops() -> None:
+    """On 10°, with 9° at residual strength, 50 mm is reached by the first block that slides on."""
+    given: dict[str, Any] = {"phi": 14.0, "residual_phi": 9.0, "weakening_distance": 0.05}
+    block: dict[str, Any] = {"theta": 10.0, "frequency": 2.0, **given, "model": WEAKENING}
+    limits = slipsweep.limit_amplitude([0.001, 0.05], **block)
+    small, endless = limits.limit_amplitude.values
+    assert displacement(**block, amplitude=small) == pytest.approx(0.001, rel=1e-9)
+    assert limits.limit_status.values.tolist() == [0, 2]
+    before = sweep(**block, amplitude=endless * (1.0 - 1e-9))
+    assert before.permanent_displacement.item() < 0.05
+    assert int(sweep(**block, amplitude=endless).validity) == Validity.NOT_AT_REST
+
+
+def test_required_strengths_are_of_constant_strength() -> None:
+    with pytest.raises(InputError, match=r"^strength = 'weakening': not allowed for a required"):
+        slipsweep.required_strength(0.05, 3.0, 1.0, theta=5.0, of="phi", model=WEAKENING)

@@ -1039,13 +1039,15 @@ def walk(
 def slide_freely(law: Law, block: Block, log: np.ndarray, time: float) -> None:
     """After the shaking the strength of Newmark's block takes V to 0, or never does.
 
-    Steps are as in `step_along`, and (64/N) of the time to the stop with the strength at the end of
-    the shaking; from where the strength is constant on, one step is all.
+    Steps are those that the law takes, at first 64/N of the time to the stop with the strength at
+    the end of the shaking, later 16/N of the time since; from where the strength is constant on, one
+    step is all.
     """
     side = -1.0 if block.phase == UP else 1.0
     still = (0.0, 0.0, 0.0)
     first_rate = rate(law, block, 0.0, block.velocity, block.slip)
-    longest = GROWTH_SHARE / block.steps * abs(block.velocity / first_rate)
+    shortest = GROWTH_SHARE / block.steps * abs(block.velocity / first_rate)
+    start = time
     while block.phase != STUCK:
         is_constant = law.knows_slip and block.slip >= block.weakens_until
         if side * first_rate >= 0.0 and (is_constant or not law.knows_slip):
@@ -1056,6 +1058,7 @@ def slide_freely(law: Law, block: Block, log: np.ndarray, time: float) -> None:
             block.phase = ATTENUATES
             attenuate(block, log, time, math.inf)
             return
+        longest = max(shortest, TIME_SHARE / block.steps * (time - start))
         h = max(min(longest, law.longest_step(block, first_rate)), SHORTEST_STEP)
         step = advance(law, block, still, h, first_rate)
         stop = part_to_stop(block, step)
@@ -1068,7 +1071,9 @@ def slide_freely(law: Law, block: Block, log: np.ndarray, time: float) -> None:
         take(block, step)
         time += step.h
         first_rate = step.last_rate
-        if stop <= 1.0 and stop <= kink:
+        # it may stop where the strength that is left is just what holds it
+        creeps = block.slip + abs(step.moved) == block.slip
+        if creeps or (stop <= 1.0 and stop <= kink):
             rest(block)
         elif kink <= 1.0:
             block.slip = block.weakens_until

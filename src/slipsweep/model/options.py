@@ -182,6 +182,12 @@ def changing_strength(model: Model) -> str | None:
     return None
 
 
+def check_constant_strength(what: str, model: Model) -> None:
+    """Refuse a strength that changes while the block slides."""
+    if (strength := changing_strength(model)) is not None:
+        raise InputError(f"strength = {strength!r}: not allowed for {what}, only 'constant'")
+
+
 Solver = Cycle | Step
 
 MODELS: Family[Model] = Family("model", "friction", (Mendez, Newmark), "mendez", "model")

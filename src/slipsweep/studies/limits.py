@@ -290,11 +290,13 @@ def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> dict[
         results[name][cell] = values
     below = criterion.displacement_of(before)
     above = criterion.displacement_of(after)
-    jumps = above - below > JUMP * above
+    with np.errstate(invalid="ignore"):
+        jumps = (above - below > JUMP * above) | np.isinf(above)  # it does not come to rest
     modes = [
         name for name in ("sliding_mode", "stick_slip_pulses", "continuous_pulses") if name in after
     ]
     other_mode = np.any([before[name] != after[name] for name in modes], axis=0)
+    other_mode &= np.isfinite(above)
     results["limit_status"][cell] = np.select(
         [np.isnan(below), jumps & other_mode, jumps],
         [LimitStatus.AFTER_GAP, LimitStatus.AT_MODE_JUMP, LimitStatus.AT_JUMP],
