@@ -92,7 +92,7 @@ def _compiled_in(folder: Path | None, function: Callable[..., Any], types: tuple
     numba.config.CACHE_DIR = str(folder)
     try:
         # with its types it is compiled at once, and for no others
-        compiled = part("arcp", cache=folder is not None, signature_or_function=[types])(function)
+        compiled = part("arcp", cache=folder is not None, signature_or_function=[types], _nrt=False, no_cfunc_wrapper=True)(function)
     finally:
         numba.config.CACHE_DIR = given
     if not kept:

@@ -117,7 +117,7 @@ def follow_eq4(
         slide.peak = max(slide.peak, velocity)
 
 
-@scalar
+@single
 def half_wave_after(path: Path, k: int) -> int:
     """Return the first piece after the negative half wave that follows interval k at once.
 

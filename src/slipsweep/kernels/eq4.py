@@ -14,7 +14,7 @@ from typing import NamedTuple
 from slipsweep.jit.decorators import inlined, scalar, single
 from slipsweep.jit.elementary import versine
 from slipsweep.kernels.base import base_acceleration, offset_at
-from slipsweep.kernels.block import Cell, Interface, Options, decay_rate_of
+from slipsweep.kernels.block import NEWMARK, Cell, Interface, Options, decay_rate_of
 from slipsweep.kernels.events import root_of
 from slipsweep.kernels.slide import Slide
 from slipsweep.model import equations as eq
@@ -51,7 +51,7 @@ class Block(NamedTuple):
     rise: int
 
 
-@inlined
+@single
 def block_of(cell: Cell, amplitude: float, interface: Interface, options: Options) -> Block:
     """Return the block of a cell; λ is from Eq. 6 where it is not given."""
     decay_rate = decay_rate_of(cell, interface.delta_mu, interface.minimum_friction, options.g)
@@ -67,10 +67,25 @@ def block_of(cell: Cell, amplitude: float, interface: Interface, options: Option
     )
 
 
+@scalar
+def held_at_yield(block: Block) -> Block:
+    """Return the block with b = Üy throughout, as it is where Eq. 4 stays below Üy."""
+    return Block(
+        block.amplitude,
+        block.yield_acceleration,
+        block.mu_s,
+        block.tan_theta,
+        block.delta_mu,
+        block.decay_rate,
+        block.g,
+        NEWMARK,
+    )
+
+
 # ---------------------------------------------------------------------------------------- values
 
 
-@inlined
+@single
 def friction_at(block: Block, x: float) -> float:
     """Return μ at Üg = x, Eq. 6."""
     return eq.friction_coefficient(x, block.mu_s, block.delta_mu, block.decay_rate, block.g)
@@ -83,7 +98,7 @@ def relative_acceleration(block: Block, x: float) -> float:
     return eq.relative_acceleration(x, mu, block.mu_s, block.tan_theta, block.g)
 
 
-@inlined
+@single
 def response(block: Block, x: float) -> float:
     """Return E(x), the block's acceleration by Eq. 4."""
     return x - relative_acceleration(block, x)
@@ -100,7 +115,7 @@ def slopes(block: Block, x: float) -> tuple[float, float, float]:
     return value, 1.0 - slope, -curvature
 
 
-@inlined
+@single
 def inflection(block: Block) -> float:
     """Return the x > 0 up to which E is concave; it is convex beyond."""
     return friction.exponential_inflection(block.tan_theta, block.decay_rate, block.g)
@@ -211,7 +226,10 @@ def panel_lag(
     amplitude = block.amplitude
     width = until - near
     top = piece.top
-    if piece.arc:
+    if abs(width) == piece.finish - piece.begin:
+        for node in range(NODE_COUNT):
+            x[node] = amplitude * curve.nodes[node]
+    elif piece.arc:
         for node in range(NODE_COUNT):
             x[node] = amplitude * (1.0 - versine(near + width * NODES[node]))
     else:

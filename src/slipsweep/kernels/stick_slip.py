@@ -178,7 +178,7 @@ def _lost(where: tuple[Block, Piece, Curve, Slide, float], tau: float) -> tuple[
 _stop_root = root_of(_lost)
 
 
-@scalar
+@single
 def straight_stop(velocity: float, rate: float, slope: float) -> float:
     """Return the time after which V ≥ 0, of a rate that changes by `slope`, is 0; infinity: never.
 
@@ -219,7 +219,8 @@ def hold(
         # nothing slows it: over a part so short that its gain is rounding, it does not stop
         stops = False
         gained = max(gained, 0.0)
-    if opposite(rate, rate_end) and (rate > 0.0 or velocity > 0.0):
+    turns = opposite(rate, rate_end) and (rate > 0.0 or velocity > 0.0)
+    if turns and (rate < 0.0 or slide.wants_peak):
         # V turns where Üg = b; one that starts from rest there only seems to fall, by rounding
         turn = offset_at(piece, curve, amplitude, held)
         extreme = velocity + held_gains(piece, curve, amplitude, held, start, turn)[0]
@@ -349,7 +350,7 @@ def rise(
     slide.displacement = math.nan
 
 
-@inlined
+@single
 def rises_anew(base: Base, p: int) -> bool:
     """Return whether piece p, of Üg > 0, jumps upwards, is a plateau, or rises after a fall."""
     piece = base.pieces[p]
@@ -359,7 +360,7 @@ def rises_anew(base: Base, p: int) -> bool:
     return fell and 0.0 < piece.first < piece.last
 
 
-@scalar
+@single
 def reset_held(block: Block, piece: Piece, x: float, slide: Slide) -> None:
     """Update b where a piece begins by a jump or plateau at Üg = x, or begin to slide (t1)."""
     if slide.slides:
@@ -499,7 +500,7 @@ def stick_slip_pulse(
     return 0
 
 
-@inlined
+@single
 def goes_on_rising(base: Base, p: int) -> bool:
     """Return whether the piece after piece p, which rises, goes on from its end and rises, too."""
     after = base.pieces[p + 1]

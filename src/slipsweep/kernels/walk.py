@@ -35,7 +35,7 @@ from slipsweep.kernels.block import (
     settled,
 )
 from slipsweep.kernels.continuous import continuous_pulse, find_velocity_extremes, follow_eq4
-from slipsweep.kernels.eq4 import Block, block_of, stays_below_yield
+from slipsweep.kernels.eq4 import Block, block_of, held_at_yield, stays_below_yield
 from slipsweep.kernels.grid import cell_at
 from slipsweep.kernels.slide import LOG, SLIDE, Slide, begin_pulse
 from slipsweep.kernels.stick_slip import Place, beginning, first_pulse, stick_slip_pulse
@@ -90,7 +90,7 @@ WALK = np.dtype(
 Walk: TypeAlias = Any
 
 
-@scalar
+@single
 def begin(walk: Walk, path: Path) -> None:
     """Set a walk to the beginning of the motion."""
     walk.velocity = 0.0
@@ -162,7 +162,7 @@ def cycles_before(path: Path, walk: Walk) -> int:
     return max(min(path.repeats - walk.left, path.repeats - 1), 0)
 
 
-@scalar
+@single
 def prepare_log(
     walk: Walk,
     path: Path,
@@ -181,7 +181,7 @@ def prepare_log(
     slide.decay_rate = block.decay_rate
 
 
-@scalar
+@single
 def begin_cycle(walk: Walk) -> None:
     """Set what is said of a plain cycle as it begins."""
     walk.entered = walk.velocity
@@ -190,7 +190,7 @@ def begin_cycle(walk: Walk) -> None:
     walk.least = walk.velocity
 
 
-@scalar
+@single
 def add_pulse(walk: Walk, slide: Slide, continuous: bool) -> None:
     """Add a pulse to the walk; an event that was not found has made its W or the largest V NaN."""
     walk.continuous_pulses += 1.0 if continuous else 0.0
@@ -206,7 +206,7 @@ def add_pulse(walk: Walk, slide: Slide, continuous: bool) -> None:
         walk.validity |= UNSOLVED
 
 
-@scalar
+@single
 def pass_over_cycles(options: Options, path: Path, walk: Walk) -> None:
     """Pass over cycles that are like the one gone through last.
 
@@ -215,14 +215,15 @@ def pass_over_cycles(options: Options, path: Path, walk: Walk) -> None:
     walk.done += 1
     gained = walk.velocity - walk.entered
     if walk.entered == 0.0 and walk.velocity == 0.0:
-        # all cycles; and the last one, which Eq. 12 ends in the same way though no pulse follows
-        alone = path.cycles.size == path.lead + 3 and (
-            path.cycles[path.lead + 1].shape == path.cycles[path.lead].shape
-        )
-        last = 1 if alone and options.recoupling == EQ12 else 0
-        add(walk, (walk.left + last) * walk.gained)
+        # all cycles; the last one, too, which Eq. 12 ends in the same way though no pulse follows
+        last = path.last_alike and options.recoupling == EQ12
+        add(walk, (walk.left + path.alike + (1 if last else 0)) * walk.gained)
         walk.left = 0
-        walk.interval = path.intervals.size if last else walk.interval
+        until = path.cycles[path.lead + 1 + path.alike].first
+        while walk.interval < path.intervals.size and (
+            last or path.intervals[walk.interval].first < until
+        ):
+            walk.interval += 1
     elif walk.least > 0.0:
         # the block never rests: V changes by the same amount each time
         alike = float(walk.left)
@@ -245,7 +246,7 @@ def pass_over_cycles(options: Options, path: Path, walk: Walk) -> None:
         walk.next_look *= 2
 
 
-@scalar
+@single
 def remember(walk: Walk) -> None:
     """Remember V and W at the end of a cycle, to which the walk may come back."""
     walk.seen_velocity = walk.velocity
@@ -269,7 +270,7 @@ def walk_pulses(
     friction of its own peak, and may be one of continuous sliding.
     """
     plain = path.cycles[path.lead].first
-    plain_end = path.cycles[path.lead + 1].first
+    plain_end = path.cycles[path.lead + 1].first if path.repeats > 0 else plain
     continuous = False
     if walk.interval < 0:
         walk.interval = first_pulse(block, path, walk.interval + 1)
@@ -286,9 +287,12 @@ def walk_pulses(
             peak = cell.amplitude * interval.height
             block, interface = block_in_pulse(cell, peak, options)
             continuous = options.rise != NEWMARK and peak > interface.limiting_acceleration
-            walk.validity |= flags_of_pulse(cell, block, interface, continuous, peak)
+            flags = flags_of_pulse(cell, block, interface, continuous, peak)
+            walk.validity |= flags
             if walk.validity & NO_VALUE:
                 break
+            if flags & YIELD_GOVERNS:
+                block = held_at_yield(block)
         start = beginning(block, path, k)
         following = first_pulse(block, path, k + 1)
         ends = beginning(block, path, following)
@@ -308,7 +312,7 @@ def walk_pulses(
                 block, recoupling, path.base, start, interval.end, ends, slide, log
             )
             slides_on = slide.velocity > 0.0 and flags == 0 and following < path.intervals.size
-            if slides_on and block.rise != NEWMARK:
+            if slides_on and options.rise != NEWMARK:
                 flags = NOT_RECOUPLED
         if log.size and slide.logged > log.size:
             slide.logged = logged
@@ -377,7 +381,7 @@ def slide_through_cycles(
     walk.ended = True
 
 
-@inlined
+@single
 def pass_cycles(path: Path, walk: Walk, c: int, count: int) -> None:
     """Count cycles that have passed, of which the first is cycle c of the path."""
     walk.done += count
@@ -396,12 +400,10 @@ def yield_governs(block: Block, path: Path) -> bool:
     """
     if block.rise != MONOTONE:
         return False
-    for p in range(path.base.pieces.size):
-        piece = path.base.pieces[p]
-        low = max(block.amplitude * piece.first, block.yield_acceleration)
-        high = block.amplitude * piece.top
-        rises = piece.last >= piece.first or piece.jumps
-        if rises and high > block.yield_acceleration and not stays_below_yield(block, low, high):
+    for i in range(path.rises.shape[0]):
+        low = max(block.amplitude * path.rises[i, 0], block.yield_acceleration)
+        high = block.amplitude * path.rises[i, 1]
+        if high > block.yield_acceleration and not stays_below_yield(block, low, high):
             return False
     return True
 
@@ -424,7 +426,7 @@ def validity_before(
     return interface.validity
 
 
-@scalar
+@single
 def set_next_phase(block: Block, path: Path, series: bool, walk: Walk) -> None:
     """Set the phase of the motion up to which the log goes."""
     walk.until = math.inf
@@ -437,7 +439,7 @@ def set_next_phase(block: Block, path: Path, series: bool, walk: Walk) -> None:
         walk.until += 2.0 * math.pi * cycles_before(path, walk)
 
 
-@scalar
+@single
 def store_walk(cell: Cell, path: Path, mode: int, walk: Walk, j: int, results: np.ndarray) -> None:
     """Write the results of a walk into column j of the results, (fields of `Motion`, cells)."""
     largest = cell.amplitude
@@ -486,7 +488,10 @@ def solve_walk(
         if log.size == 0 or not walk.begun:
             begin(walk, path)
             walk.validity = validity_before(cell, block, interface, options, path)
+        if walk.validity & YIELD_GOVERNS and not path.recorded:
+            block = held_at_yield(block)
         slide.logged = 0
+        slide.wants_peak = options.wants_peak
         if walk.validity & NO_VALUE or highest <= block.yield_acceleration:
             walk.ended = True
         elif series:
