@@ -8,7 +8,7 @@ import numpy as np
 from slipsweep.grid.inputs import Problem
 from slipsweep.kernels import block as physics
 from slipsweep.kernels.grid import find_parameters
-from slipsweep.kernels.sine.solve import solve_sine
+from slipsweep.kernels.sine.solve import batches_of_sine, solve_sine
 from slipsweep.kernels.step import RECTANGLE, SIMPSON, TRAPEZOID, solve_steps
 from slipsweep.kernels.walk import solve_walk, workspace_of
 from slipsweep.model.options import Mendez, Step
@@ -71,7 +71,7 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
         solve_walk(cells, options, path, *workspace_of(), results)
 
     def under_sine(cells: np.ndarray, results: np.ndarray) -> None:
-        if solve_sine(cells, options, results):
+        if solve_sine(cells, options, batches_of_sine(), results):
             left = np.flatnonzero(results[ROWS["validity"]] == physics.UNSOLVED)
             found = np.empty((len(physics.Motion._fields), left.size))
             under_wave(cells[left], found)

@@ -42,7 +42,7 @@ announce: Callable[[str], object] = str
 _compiling = threading.Lock()
 
 
-def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+def kernel(function: Callable[..., Any], allocates: bool = True) -> Callable[..., Any]:
     """Decorates a function that Python calls; what it calls is decorated as `slipsweep.jit.decorators` says.
 
     It is compiled by `numba.njit` when first called, or loaded from disk, and runs without the GIL.
@@ -60,14 +60,18 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
                     # lost
                     with ThreadPoolExecutor(1) as pool:
                         compiled = pool.submit(
-                            _compiled, function, tuple(map(numba.typeof, args))
+                            _compiled, function, tuple(map(numba.typeof, args)), allocates
                         ).result()
         return compiled(*args)
 
     return call
 
 
-def _compiled(function: Callable[..., Any], types: tuple[Any, ...]) -> Any:
+#: The same for a kernel that allocates nothing: it counts no references to its arguments.
+kernel_without_memory = functools.partial(kernel, allocates=False)
+
+
+def _compiled(function: Callable[..., Any], types: tuple[Any, ...], allocates: bool) -> Any:
     """The machine code of a kernel for arguments of these types, from disk or kept there for other processes."""
     folder = cache_folder()
     with warnings.catch_warnings():
@@ -78,11 +82,13 @@ def _compiled(function: Callable[..., Any], types: tuple[Any, ...]) -> Any:
             # for itself
             lock = filelock.FileLock(folder / f"{function.__name__}.lock", timeout=_PATIENCE)
             with contextlib.suppress(OSError, NotImplementedError), lock:
-                return _compiled_in(folder, function, types)
-        return _compiled_in(None, function, types)
+                return _compiled_in(folder, function, types, allocates)
+        return _compiled_in(None, function, types, allocates)
 
 
-def _compiled_in(folder: Path | None, function: Callable[..., Any], types: tuple[Any, ...]) -> Any:
+def _compiled_in(
+    folder: Path | None, function: Callable[..., Any], types: tuple[Any, ...], allocates: bool
+) -> Any:
     global seconds
     kept = folder is not None and any(folder.glob(f"**/*.{function.__name__}-*.nbi"))
     if not kept:
@@ -92,7 +98,13 @@ def _compiled_in(folder: Path | None, function: Callable[..., Any], types: tuple
     numba.config.CACHE_DIR = str(folder)
     try:
         # with its types it is compiled at once, and for no others
-        compiled = part("arcp", cache=folder is not None, signature_or_function=[types], _nrt=False, no_cfunc_wrapper=True)(function)
+        compiled = part(
+            "arcp",
+            cache=folder is not None,
+            signature_or_function=[types],
+            no_cfunc_wrapper=True,
+            _nrt=allocates,
+        )(function)
     finally:
         numba.config.CACHE_DIR = given
     if not kept:

@@ -51,7 +51,7 @@ class Block(NamedTuple):
     rise: int
 
 
-@single
+@inlined
 def block_of(cell: Cell, amplitude: float, interface: Interface, options: Options) -> Block:
     """Return the block of a cell; λ is from Eq. 6 where it is not given."""
     decay_rate = decay_rate_of(cell, interface.delta_mu, interface.minimum_friction, options.g)
@@ -69,7 +69,7 @@ def block_of(cell: Cell, amplitude: float, interface: Interface, options: Option
 
 @scalar
 def held_at_yield(block: Block) -> Block:
-    """Return the block with b = Üy throughout, as it is where Eq. 4 stays below Üy."""
+    """Return the block with b = Üy throughout, as it is where E ≤ Üy and no rise begins below Üy."""
     return Block(
         block.amplitude,
         block.yield_acceleration,
@@ -85,7 +85,7 @@ def held_at_yield(block: Block) -> Block:
 # ---------------------------------------------------------------------------------------- values
 
 
-@single
+@inlined
 def friction_at(block: Block, x: float) -> float:
     """Return μ at Üg = x, Eq. 6."""
     return eq.friction_coefficient(x, block.mu_s, block.delta_mu, block.decay_rate, block.g)
@@ -98,7 +98,7 @@ def relative_acceleration(block: Block, x: float) -> float:
     return eq.relative_acceleration(x, mu, block.mu_s, block.tan_theta, block.g)
 
 
-@single
+@inlined
 def response(block: Block, x: float) -> float:
     """Return E(x), the block's acceleration by Eq. 4."""
     return x - relative_acceleration(block, x)
@@ -115,7 +115,7 @@ def slopes(block: Block, x: float) -> tuple[float, float, float]:
     return value, 1.0 - slope, -curvature
 
 
-@single
+@inlined
 def inflection(block: Block) -> float:
     """Return the x > 0 up to which E is concave; it is convex beyond."""
     return friction.exponential_inflection(block.tan_theta, block.decay_rate, block.g)

@@ -6,7 +6,7 @@ array of dtype `CELL`.
 
 import numpy as np
 
-from slipsweep.jit.compiling import kernel
+from slipsweep.jit.compiling import kernel_without_memory
 from slipsweep.jit.decorators import inlined, single, uncounted
 from slipsweep.kernels.block import FRICTION_ESTIMATED, Cell, Options, decay_rate_of, interface_of
 from slipsweep.motion.pieces import Wave
@@ -46,7 +46,7 @@ def uncounted_wave(wave: Wave) -> Wave:
     )
 
 
-@kernel
+@kernel_without_memory
 def find_parameters(cells: np.ndarray, options: Options, parameters: np.ndarray) -> None:
     """Write Üy, Eqs. 7-11 and λ of the cells of a tile, their mode and the validity known before the motion.
 

@@ -4,7 +4,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from slipsweep.jit.decorators import inlined, scalar, single
+from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.kernels.base import phase_at
 from slipsweep.motion.paths import Piece
 from slipsweep.motion.pieces import NODES
@@ -84,7 +84,7 @@ LOG = np.dtype(
 )
 
 
-@single
+@inlined
 def begin_pulse(slide: Slide, velocity: float) -> None:
     """Set the state of a block at the beginning of a pulse that it enters with V = `velocity`."""
     slide.velocity = velocity
@@ -95,7 +95,7 @@ def begin_pulse(slide: Slide, velocity: float) -> None:
     slide.slips = 0.0
 
 
-@single
+@inlined
 def begin_to_slide(slide: Slide, held: float) -> None:
     """Let a block at rest begin to slide with an acceleration (t1)."""
     slide.velocity = 0.0
@@ -139,7 +139,7 @@ def note(slide: Slide, log: np.ndarray, piece: Piece, start: float, end: float, 
     row.decay_rate = slide.decay_rate
 
 
-@single
+@inlined
 def note_part(slide: Slide, log: np.ndarray, piece: Piece, start: float, end: float) -> None:
     """Write a part of the motion along a piece, from τ to τ, into the log, if one is kept."""
     if log.size:

@@ -178,7 +178,7 @@ def _lost(where: tuple[Block, Piece, Curve, Slide, float], tau: float) -> tuple[
 _stop_root = root_of(_lost)
 
 
-@single
+@scalar
 def straight_stop(velocity: float, rate: float, slope: float) -> float:
     """Return the time after which V ≥ 0, of a rate that changes by `slope`, is 0; infinity: never.
 
@@ -220,7 +220,7 @@ def hold(
         stops = False
         gained = max(gained, 0.0)
     turns = opposite(rate, rate_end) and (rate > 0.0 or velocity > 0.0)
-    if turns and (rate < 0.0 or slide.wants_peak):
+    if turns and (rate < 0.0 or stops or slide.wants_peak):
         # V turns where Üg = b; one that starts from rest there only seems to fall, by rounding
         turn = offset_at(piece, curve, amplitude, held)
         extreme = velocity + held_gains(piece, curve, amplitude, held, start, turn)[0]
@@ -350,7 +350,7 @@ def rise(
     slide.displacement = math.nan
 
 
-@single
+@inlined
 def rises_anew(base: Base, p: int) -> bool:
     """Return whether piece p, of Üg > 0, jumps upwards, is a plateau, or rises after a fall."""
     piece = base.pieces[p]
@@ -360,7 +360,7 @@ def rises_anew(base: Base, p: int) -> bool:
     return fell and 0.0 < piece.first < piece.last
 
 
-@single
+@scalar
 def reset_held(block: Block, piece: Piece, x: float, slide: Slide) -> None:
     """Update b where a piece begins by a jump or plateau at Üg = x, or begin to slide (t1)."""
     if slide.slides:
@@ -389,7 +389,7 @@ def attenuate(
     gain(slide, side * eq.attenuated_velocity(speed, held, duration), side * moved)
 
 
-@single
+@scalar
 def recouple(
     block: Block,
     recoupling: int,
@@ -408,7 +408,7 @@ def recouple(
     started = base.pieces[t5].start if t5 < count else base.pieces[count - 1].end
     ends = following.piece >= count
     if recoupling == INTEGRATE:
-        for p in range(t5, min(following.piece + 1, count)):
+        for p in range(t5, count if ends else following.piece + 1):
             piece = base.pieces[p]
             end = following.tau if p == following.piece else piece.finish
             if slide.slides and end > piece.begin:
@@ -451,7 +451,7 @@ def beginning(block: Block, path: Path, k: int) -> Place:
     return Place(p, offset_at(piece, path.base.curves[piece.curve], block.amplitude, onset_))
 
 
-@single
+@scalar
 def stick_slip_pulse(
     block: Block,
     recoupling: int,
@@ -500,7 +500,7 @@ def stick_slip_pulse(
     return 0
 
 
-@single
+@inlined
 def goes_on_rising(base: Base, p: int) -> bool:
     """Return whether the piece after piece p, which rises, goes on from its end and rises, too."""
     after = base.pieces[p + 1]

@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from slipsweep.jit.compiling import kernel
+from slipsweep.jit.compiling import kernel_without_memory
 from slipsweep.jit.decorators import inlined, scalar, single
 from slipsweep.kernels.base import phase_at
 from slipsweep.kernels.block import (
@@ -90,7 +90,7 @@ WALK = np.dtype(
 Walk: TypeAlias = Any
 
 
-@single
+@scalar
 def begin(walk: Walk, path: Path) -> None:
     """Set a walk to the beginning of the motion."""
     walk.velocity = 0.0
@@ -159,10 +159,11 @@ def flags_of_pulse(
 @inlined
 def cycles_before(path: Path, walk: Walk) -> int:
     """Return how many cycles more have passed than the path has, which has the plain cycle once."""
-    return max(min(path.repeats - walk.left, path.repeats - 1), 0)
+    passed = path.repeats - walk.left
+    return passed - 1 if 0 < passed == path.repeats else passed
 
 
-@single
+@scalar
 def prepare_log(
     walk: Walk,
     path: Path,
@@ -181,7 +182,7 @@ def prepare_log(
     slide.decay_rate = block.decay_rate
 
 
-@single
+@scalar
 def begin_cycle(walk: Walk) -> None:
     """Set what is said of a plain cycle as it begins."""
     walk.entered = walk.velocity
@@ -190,7 +191,7 @@ def begin_cycle(walk: Walk) -> None:
     walk.least = walk.velocity
 
 
-@single
+@scalar
 def add_pulse(walk: Walk, slide: Slide, continuous: bool) -> None:
     """Add a pulse to the walk; an event that was not found has made its W or the largest V NaN."""
     walk.continuous_pulses += 1.0 if continuous else 0.0
@@ -206,7 +207,7 @@ def add_pulse(walk: Walk, slide: Slide, continuous: bool) -> None:
         walk.validity |= UNSOLVED
 
 
-@single
+@scalar
 def pass_over_cycles(options: Options, path: Path, walk: Walk) -> None:
     """Pass over cycles that are like the one gone through last.
 
@@ -228,7 +229,7 @@ def pass_over_cycles(options: Options, path: Path, walk: Walk) -> None:
         # the block never rests: V changes by the same amount each time
         alike = float(walk.left)
         if gained < 0.0:
-            alike = min(alike, math.floor(walk.least / -gained))
+            alike = min(alike, float(math.floor(walk.least / -gained)))
         add(walk, alike * walk.gained + math.pi * gained * alike * (alike + 1.0))
         walk.velocity += alike * gained
         walk.left -= int(alike)
@@ -246,7 +247,7 @@ def pass_over_cycles(options: Options, path: Path, walk: Walk) -> None:
         walk.next_look *= 2
 
 
-@single
+@scalar
 def remember(walk: Walk) -> None:
     """Remember V and W at the end of a cycle, to which the walk may come back."""
     walk.seen_velocity = walk.velocity
@@ -287,12 +288,9 @@ def walk_pulses(
             peak = cell.amplitude * interval.height
             block, interface = block_in_pulse(cell, peak, options)
             continuous = options.rise != NEWMARK and peak > interface.limiting_acceleration
-            flags = flags_of_pulse(cell, block, interface, continuous, peak)
-            walk.validity |= flags
+            walk.validity |= flags_of_pulse(cell, block, interface, continuous, peak)
             if walk.validity & NO_VALUE:
                 break
-            if flags & YIELD_GOVERNS:
-                block = held_at_yield(block)
         start = beginning(block, path, k)
         following = first_pulse(block, path, k + 1)
         ends = beginning(block, path, following)
@@ -325,6 +323,7 @@ def walk_pulses(
             walk.left -= 1
             if log.size == 0:
                 pass_over_cycles(options, path, walk)
+                walk.interval = first_pulse(block, path, walk.interval)
             if walk.left > 0:
                 walk.interval = walk.first
     walk.ended = True
@@ -381,7 +380,7 @@ def slide_through_cycles(
     walk.ended = True
 
 
-@single
+@inlined
 def pass_cycles(path: Path, walk: Walk, c: int, count: int) -> None:
     """Count cycles that have passed, of which the first is cycle c of the path."""
     walk.done += count
@@ -426,7 +425,7 @@ def validity_before(
     return interface.validity
 
 
-@single
+@scalar
 def set_next_phase(block: Block, path: Path, series: bool, walk: Walk) -> None:
     """Set the phase of the motion up to which the log goes."""
     walk.until = math.inf
@@ -439,7 +438,7 @@ def set_next_phase(block: Block, path: Path, series: bool, walk: Walk) -> None:
         walk.until += 2.0 * math.pi * cycles_before(path, walk)
 
 
-@single
+@scalar
 def store_walk(cell: Cell, path: Path, mode: int, walk: Walk, j: int, results: np.ndarray) -> None:
     """Write the results of a walk into column j of the results, (fields of `Motion`, cells)."""
     largest = cell.amplitude
@@ -460,7 +459,7 @@ def store_walk(cell: Cell, path: Path, mode: int, walk: Walk, j: int, results: n
         results[NUMBER_OF_SLIPS + 2, j] = walk.continuous_pulses
 
 
-@kernel
+@kernel_without_memory
 def solve_walk(
     cells: np.ndarray,
     options: Options,
@@ -488,7 +487,7 @@ def solve_walk(
         if log.size == 0 or not walk.begun:
             begin(walk, path)
             walk.validity = validity_before(cell, block, interface, options, path)
-        if walk.validity & YIELD_GOVERNS and not path.recorded:
+        if walk.validity & YIELD_GOVERNS and path.rises_once:
             block = held_at_yield(block)
         slide.logged = 0
         slide.wants_peak = options.wants_peak

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from slipsweep.jit.compiling import kernel
+from slipsweep.jit.compiling import kernel_without_memory
 from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.kernels import block as physics
 from slipsweep.kernels.sine import kinds, pulse
@@ -76,13 +76,15 @@ def solve_batch(batch: Batch, kind: int, options: physics.Options, results: np.n
     return unsolved
 
 
-@kernel
-def solve_sine(cells: np.ndarray, options: physics.Options, results: np.ndarray) -> int:
+@kernel_without_memory
+def solve_sine(
+    cells: np.ndarray, options: physics.Options, batches: np.ndarray, results: np.ndarray
+) -> int:
     """Solve cells under a sine into W, V, mode and validity, the first rows of `results`, (fields of `Motion`, cells).
 
-    Returns how many are left to the kernel that solves any waveform: their validity is `UNSOLVED`.
+    `batches` are those of `batches_of_sine`.  Returns how many are left to the kernel that solves
+    any waveform: their validity is `UNSOLVED`.
     """
-    batches = np.empty(kinds.KINDS + 1, BATCH)
     for kind in range(kinds.KINDS):
         batches[kind].used = 0
     loaded = batches[kinds.KINDS]
@@ -107,3 +109,8 @@ def solve_sine(cells: np.ndarray, options: physics.Options, results: np.ndarray)
         if batches[kind].used > 0:
             unsolved += solve_batch(batches[kind], kind, options, results)
     return unsolved
+
+
+def batches_of_sine() -> np.ndarray:
+    """Return the batches that `solve_sine` puts cells into, for one thread."""
+    return np.empty(kinds.KINDS + 1, BATCH)
