@@ -9,11 +9,11 @@ import pytest
 import slipsweep
 from slipsweep import RunError
 from slipsweep.grid import solvers
-from slipsweep.kernels import events
+from slipsweep.kernels import events, step
 from slipsweep.kernels.block import UNSOLVED
 
 
-@numba.njit(error_model="numpy")
+@numba.njit(error_model="numpy")  # type: ignore[untyped-decorator]
 def _power(where: tuple[float, float], x: float) -> tuple[float, float]:
     root, power = where
     return math.copysign(abs(x - root) ** power, x - root), power * abs(x - root) ** (power - 1.0)
@@ -22,7 +22,7 @@ def _power(where: tuple[float, float], x: float) -> tuple[float, float]:
 _root_of_power = events.root_of(_power)
 
 
-@numba.njit
+@numba.njit  # type: ignore[untyped-decorator]
 def _root(where: tuple[float, float], below: float, above: float) -> float:
     return _root_of_power(where, below, above, above, 0.0)
 
@@ -63,7 +63,7 @@ def test_a_cell_that_is_not_solved_ends_the_run_and_is_named(
     options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(solvers, "solve_walk", failing)
-    monkeypatch.setattr(solvers, "solve_steps", failing)
+    monkeypatch.setattr(step, "solve_steps", failing)
     axes: dict[str, Any] = {
         "theta": [0.0, 5.0],
         "mu_s": 0.3,

@@ -94,12 +94,12 @@ def test_slopes_of_eq4_are_those_of_its_values(ground: float) -> None:
     )
 
 
-@numba.njit(error_model="numpy")
+@numba.njit(error_model="numpy")  # type: ignore[untyped-decorator]
 def _lag(x: Any, mu: Any) -> Any:
     return eq.lag(x, mu, MU_S, TAN_THETA, G)
 
 
-@numba.njit
+@numba.njit  # type: ignore[untyped-decorator]
 def _opposite(a: float, b: float) -> bool:
     return opposite(a, b)
 

@@ -222,8 +222,11 @@ class Block:
             self.meet(section.ground(a), section.ground((a + b) / 2))
             while self.sliding and a < b:
                 a = self.slide(section, a, b)
-                if not self.sliding and a < b:
+                if self.rests() and a < b:
                     self.begin(section.ground(a), section.ground((a + b) / 2))
+
+    def rests(self) -> bool:
+        return not self.sliding
 
     def meet(self, x: mpfr, beyond: mpfr) -> None:
         """What happens as the base comes to x, not falling, on its way to `beyond`."""

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-import cffi
 import numba
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -52,17 +51,3 @@ equation: Callable[[_Function], _Function] = numba.extending.register_jitable(
     nogil=True, error_model="numpy", fastmath={"contract", "arcp"}, forceinline=True, **_INTERNAL
 )
 registered = equation
-
-_ffi = cffi.FFI()
-
-
-def _uncounted(array: Any) -> Any:
-    """The same array, to which numba counts no references.
-
-    For arguments of a kernel, which outlive it: numba would count references to each array of a
-    wave in each function that it goes through, half of the time of a cell.
-    """
-    return numba.carray(_ffi.from_buffer(array), array.shape)
-
-
-uncounted = (lambda array: array) if numba.config.DISABLE_JIT else scalar(_uncounted)

@@ -6,10 +6,9 @@ array of dtype `CELL`.
 
 import numpy as np
 
-from slipsweep.jit.compiling import kernel_without_memory
-from slipsweep.jit.decorators import inlined, single, uncounted
+from slipsweep.jit.compiling import kernel
+from slipsweep.jit.decorators import inlined
 from slipsweep.kernels.block import FRICTION_ESTIMATED, Cell, Options, decay_rate_of, interface_of
-from slipsweep.motion.pieces import Wave
 
 #: The fields of `Cell` of the cells of a tile.
 CELL = np.dtype((np.record, [(name, np.float64) for name in Cell._fields]))
@@ -30,23 +29,7 @@ def cell_at(cells: np.ndarray, j: int) -> Cell:
     )
 
 
-@single
-def uncounted_wave(wave: Wave) -> Wave:
-    """The same wave (`decorators.uncounted`)."""
-    return Wave(
-        uncounted(wave.pieces),
-        uncounted(wave.cycle),
-        uncounted(wave.shape),
-        uncounted(wave.interval),
-        uncounted(wave.height),
-        wave.highest,
-        wave.lowest,
-        wave.lead,
-        wave.repeats,
-    )
-
-
-@kernel_without_memory
+@kernel
 def find_parameters(cells: np.ndarray, options: Options, parameters: np.ndarray) -> None:
     """Write Üy, Eqs. 7-11 and λ of the cells of a tile, their mode and the validity known before the motion.
 

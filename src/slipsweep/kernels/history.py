@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slipsweep.jit.compiling import kernel_without_memory
+from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels.base import base_acceleration, held_gains
 from slipsweep.kernels.block import Cell, Motion, Options, interface_of
@@ -69,7 +69,7 @@ def cycle_of_path(path: Path, n: int) -> int:
     return path.lead if n < path.lead + path.repeats else n - max(path.repeats - 1, 0)
 
 
-@kernel_without_memory
+@kernel
 def fill_base(
     amplitude: float, cycles: int, path: Path, phases: np.ndarray, ground: np.ndarray
 ) -> None:
@@ -120,7 +120,7 @@ def sample_part(
     history.displacement[at] = part.displacement + velocity * since + moved
 
 
-@kernel_without_memory
+@kernel
 def sample_log(
     cell: Cell,
     options: Options,

@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from slipsweep.jit.compiling import kernel_without_memory
+from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import inlined, scalar, single
 from slipsweep.kernels.base import phase_at
 from slipsweep.kernels.block import (
@@ -29,10 +29,12 @@ from slipsweep.kernels.block import (
     YIELD_GOVERNS,
     Cell,
     Interface,
+    Motion,
     Options,
     interface_of,
     remarks_on,
     settled,
+    store,
 )
 from slipsweep.kernels.continuous import continuous_pulse, find_velocity_extremes, follow_eq4
 from slipsweep.kernels.eq4 import Block, block_of, held_at_yield, stays_below_yield
@@ -41,9 +43,6 @@ from slipsweep.kernels.slide import LOG, SLIDE, Slide, begin_pulse
 from slipsweep.kernels.stick_slip import Place, beginning, first_pulse, stick_slip_pulse
 from slipsweep.model import equations as eq
 from slipsweep.motion.paths import Path
-
-#: Rows of the results, (fields of `Motion`, cells).
-DISPLACEMENT, PEAK_VELOCITY, SLIDING_MODE, VALIDITY, NUMBER_OF_SLIPS = range(5)
 
 #: How far a cell has come.
 WALK = np.dtype(
@@ -439,27 +438,32 @@ def set_next_phase(block: Block, path: Path, series: bool, walk: Walk) -> None:
 
 
 @scalar
-def store_walk(cell: Cell, path: Path, mode: int, walk: Walk, j: int, results: np.ndarray) -> None:
-    """Write the results of a walk into column j of the results, (fields of `Motion`, cells)."""
+def motion_of(cell: Cell, path: Path, mode: int, walk: Walk) -> Motion:
+    """Return the results of a walk; a record has no mode, but counts of pulses, a wave no counts."""
     largest = cell.amplitude
     if path.recorded:
         largest *= max(path.highest, -path.lowest)
     validity = settled(walk.validity, walk.displacement, largest)
-    none = validity & NO_VALUE != 0
-    results[DISPLACEMENT, j] = math.nan if none else walk.displacement
-    results[PEAK_VELOCITY, j] = math.nan if none else walk.peak
-    results[VALIDITY, j] = validity
-    # a record has no mode, but counts of pulses; a wave has no counts
-    results[SLIDING_MODE, j] = math.nan if path.recorded else (-1.0 if none else mode)
-    for row in range(NUMBER_OF_SLIPS, NUMBER_OF_SLIPS + 3):
-        results[row, j] = -1.0 if path.recorded else math.nan
-    if path.recorded and not none:
-        results[NUMBER_OF_SLIPS, j] = walk.slips
-        results[NUMBER_OF_SLIPS + 1, j] = walk.stick_slip_pulses
-        results[NUMBER_OF_SLIPS + 2, j] = walk.continuous_pulses
+    if validity & NO_VALUE != 0:
+        no_mode = math.nan if path.recorded else -1.0
+        no_count = -1.0 if path.recorded else math.nan
+        return Motion(math.nan, math.nan, no_mode, float(validity), no_count, no_count, no_count)
+    if path.recorded:
+        return Motion(
+            walk.displacement,
+            walk.peak,
+            math.nan,
+            float(validity),
+            walk.slips,
+            walk.stick_slip_pulses,
+            walk.continuous_pulses,
+        )
+    return Motion(
+        walk.displacement, walk.peak, float(mode), float(validity), math.nan, math.nan, math.nan
+    )
 
 
-@kernel_without_memory
+@kernel
 def solve_walk(
     cells: np.ndarray,
     options: Options,
@@ -498,7 +502,7 @@ def solve_walk(
         else:
             walk_pulses(cell, block, options, path, walk, slide, log)
         set_next_phase(block, path, series, walk)
-        store_walk(cell, path, mode, walk, j, results)
+        store(motion_of(cell, path, mode, walk), j, results)
 
 
 def workspace_of(rows: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

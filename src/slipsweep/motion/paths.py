@@ -8,6 +8,7 @@ one type, and the coefficients of the curved ones stand apart.
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slipsweep.motion.pieces import NODES, Wave
 
@@ -183,3 +184,27 @@ def _rises(pieces: np.ndarray) -> np.ndarray:
         else:
             ranges.append([low, high])
     return np.array(ranges, np.float64).reshape(-1, 2)
+
+
+def values_at(path: Path, phases: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return w at phases of the shaking, or at times of a record; at a jump the value after it."""
+    pieces = path.base.pieces
+    repeated = max(path.repeats - 1, 0)
+    cycle = np.zeros(phases.size, np.int64)  # of the shaking; `row` is that of the path
+    row = cycle
+    if not path.recorded:
+        cycles = path.cycles.size - 1 + repeated
+        cycle = np.clip(np.floor(phases / (2.0 * np.pi)).astype(np.int64), 0, cycles - 1)
+        row = np.where(cycle < path.lead, cycle, np.maximum(cycle - repeated, path.lead))
+    inside = phases - 2.0 * np.pi * (cycle - row)
+    p = np.searchsorted(pieces["start"], inside, side="right") - 1
+    p = np.clip(p, path.cycles["first"][row], path.cycles["first"][row + 1] - 1)
+    begin = pieces["begin"][p]
+    tau = np.clip(begin + (inside - pieces["start"][p]), begin, pieces["finish"][p])
+    offset = pieces["slope"][p] * tau
+    curved = pieces["degree"][p] > 1
+    offset[curved] = 0.0
+    for coefficient in path.base.curves["coefficients"][pieces["curve"][p][curved]].T[::-1]:
+        offset[curved] = (offset[curved] + coefficient) * tau[curved]
+    shaken = (pieces["start"][0] <= inside) & (inside < pieces["end"][-1])
+    return np.where(shaken, pieces["top"][p] + offset, 0.0)

@@ -205,10 +205,11 @@ class Observation:
     def _weighted(self, series: Mapping[str, Floats]) -> Floats:
         """The samples that count, channel by channel, in standard deviations; 0 of a channel that is not there."""
         none = np.zeros(self.test.times.size)
-        return (
+        weighted: Floats = (
             np.array([series.get(name, none) for name in self.channels])[self._counted]
             * self._scale
         )
+        return weighted
 
     def _by_channel(self, values: Floats) -> list[Floats]:
         return np.split(values, np.cumsum(self._counted.sum(axis=1))[:-1])

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from slipsweep.jit.compiling import kernel_without_memory
+from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.kernels import block as physics
 from slipsweep.kernels.sine import kinds, pulse
@@ -76,7 +76,7 @@ def solve_batch(batch: Batch, kind: int, options: physics.Options, results: np.n
     return unsolved
 
 
-@kernel_without_memory
+@kernel
 def solve_sine(
     cells: np.ndarray, options: physics.Options, batches: np.ndarray, results: np.ndarray
 ) -> int:
