@@ -36,6 +36,9 @@ ROWS["newmark_displacement"] = ROWS["permanent_displacement"]
 NEWMARK_ROWS = {name: row for row, name in enumerate(newmark.RESULTS)}
 NEWMARK_ROWS["newmark_displacement"] = NEWMARK_ROWS["permanent_displacement"]
 
+STEP_ROWS = {name: row for row, name in enumerate(step.RESULTS)}
+STEP_ROWS["newmark_displacement"] = STEP_ROWS["permanent_displacement"]
+
 #: The same of `find_parameters`.
 _PARAMETER_ROWS = {
     name: row for row, name in enumerate((*FRICTION_PARAMETERS, "sliding_mode", "validity"))
@@ -91,9 +94,9 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
 
     if isinstance(problem.solver, Step):
         stepper = stepper_of(problem, options, polarity)
-        no_history = step.history_of(np.empty(0), np.empty(0))
+        no_log = np.empty(0, step.LOG)
         return Solver(
-            lambda cells, results: stepper(cells, no_history, results), ROWS, step.STEP_CELL
+            lambda cells, results: stepper(cells, no_log, results), STEP_ROWS, step.STEP_CELL
         )
     if isinstance(motion, Record):
         path = cutting.path_of_record(motion, polarity)
@@ -140,8 +143,11 @@ def path_under(motion: Waveform | Record, polarity: float) -> Path:
 
 def stepper_of(
     problem: Problem, options: physics.Options, polarity: float
-) -> Callable[[np.ndarray, step.History, np.ndarray], Any]:
-    """What solves cells by steps: cells, of dtype `step.STEP_CELL`, a history and results."""
+) -> Callable[[np.ndarray, np.ndarray, np.ndarray], Any]:
+    """What solves cells by steps: cells, of dtype `step.STEP_CELL`, a log and results.
+
+    It returns the block of the last cell.
+    """
     assert isinstance(problem.solver, Step)
     rule = RULES[problem.solver.rule]
     count = problem.solver.steps_per_cycle
@@ -151,12 +157,10 @@ def stepper_of(
     path = path_under(problem.excitation, polarity)
     steps = step.steps_of(path, rule, count, on_piece)
 
-    def solve(cells: np.ndarray, history: step.History, results: np.ndarray) -> None:
+    def solve(cells: np.ndarray, log: np.ndarray, results: np.ndarray) -> Any:
         blocks = step.blocks_of(rule, count, on_piece)
-        step.solve_steps(cells, options, path, blocks, steps, history, results)
-        if slides_both_ways(problem.model):  # a displacement upslope is no caution there
-            validity = results[ROWS["validity"]].astype(np.int64)
-            results[ROWS["validity"]] = validity & ~physics.UPSLOPE
+        step.solve_steps(cells, options, path, blocks, steps, log, results)
+        return blocks[0]
 
     return solve
 

@@ -15,7 +15,8 @@ from slipsweep.grid import engine, plans, resources, solvers
 from slipsweep.grid import inputs as grid_inputs
 from slipsweep.kernels import history as kernels
 from slipsweep.kernels import step
-from slipsweep.kernels.block import Cell, Motion
+from slipsweep.kernels.block import Cell
+from slipsweep.model import equations as eq
 from slipsweep.model import options, parameters, variables
 from slipsweep.model.variables import HISTORY
 from slipsweep.motion import cutting
@@ -195,13 +196,16 @@ class _History:
         cells = np.full((1, len(step.STEP_CELL.names or ())), math.nan).view(step.STEP_CELL)[:, 0]
         for name, value in zip(Cell._fields, self.cell, strict=True):
             cells[name] = value
+        results = np.empty((len(step.RESULTS), 1))
+        # once to count the steps, once to note them
+        counted = _interruptible(stepper, cells, np.empty(1, step.LOG), results)
+        log = np.empty(int(counted["logged"]), step.LOG)
+        _interruptible(stepper, cells, log, results)
         table[0] = self.cell.amplitude * values_at(self.path, phases)
-        history = step.history_of(phases, table[0])
-        _interruptible(stepper, cells, history, np.empty((len(Motion._fields), 1)))
-        table[1] = history.block_acceleration
-        table[2] = history.friction_coefficient
-        table[3] = history.velocity
-        table[4] = history.displacement
+        table[1], table[3], table[4] = step.samples_of(log, phases, table[0])
+        table[2] = eq.mobilised_friction(
+            table[0], table[1], self.cell.mu_s, self.cell.tan_theta, self.options.g
+        )
 
     def _walk(self, phases: Floats, table: Floats) -> None:
         """Fill in a history from event to event."""
@@ -299,16 +303,15 @@ class _History:
         return np.concatenate([shaken, shaken[-1] + rest])
 
 
-def _interruptible(kernel: Callable[..., None], *args: Any) -> None:
+def _interruptible(kernel: Callable[..., Any], *args: Any) -> Any:
     """Run a kernel on a thread: the main thread hears Ctrl-C while it waits, and a daemon does not hold up the exit."""
-    done: Future[None] = Future()
+    done: Future[Any] = Future()
 
     def run() -> None:
         try:
-            kernel(*args)
-            done.set_result(None)
+            done.set_result(kernel(*args))
         except BaseException as error:  # raised where the result is waited for
             done.set_exception(error)
 
     threading.Thread(target=run, daemon=True).start()
-    done.result()
+    return done.result()
