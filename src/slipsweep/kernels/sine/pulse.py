@@ -5,7 +5,7 @@ Rules of the motion: docs/model.md.  ψ is the phase from the peak of the pulse.
 
 import math
 
-from slipsweep.jit.decorators import scalar
+from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.jit.elementary import angle_minus_sine, rising_phase
 from slipsweep.kernels.block import INTEGRATE, NOT_RECOUPLED, Options
 from slipsweep.kernels.sine.batch import (
@@ -25,19 +25,18 @@ from slipsweep.model import equations as eq
 from slipsweep.model.friction import exponential_inflection
 
 
-@scalar
-def begin(batch: Batch, options: Options) -> None:
-    """Set the cells of a batch to the beginning of the motion, at rest."""
-    for j in range(WIDTH):
-        batch.pulses[j] = options.cycles
-        batch.entered[j] = 0.0
-        batch.total[j] = 0.0
-        batch.lost[j] = 0.0
-        batch.highest[j] = 0.0 if options.wants_peak else math.nan
-        batch.slides[j] = 1.0
-        batch.never_rests[j] = 1.0
-        batch.solved[j] = 1.0
-        batch.validity[j] = 0.0
+@inlined
+def begin(batch: Batch, j: int, options: Options) -> None:
+    """Set a cell of a batch to the beginning of the motion, at rest."""
+    batch.pulses[j] = options.cycles
+    batch.entered[j] = 0.0
+    batch.total[j] = 0.0
+    batch.lost[j] = 0.0
+    batch.highest[j] = 0.0 if options.wants_peak else math.nan
+    batch.slides[j] = 1.0
+    batch.never_rests[j] = 1.0
+    batch.solved[j] = 1.0
+    batch.validity[j] = 0.0
 
 
 @scalar
@@ -161,6 +160,7 @@ def repeat(batch: Batch, options: Options) -> int:
     By integration the block is at rest within the cycle, and all are alike.  For Eq. 12 let V₀ be
     V at Üg = Üy, L be V and M be W at t5, v₁ what is left of L at the next Üg = Üy, h the phase
     from Üg = Üy to t5, and W₀ = M + (L² − v₁²)/(2b).  If v₁ = V₀ the next pulse is like this one.
+    If v₁ = 0 all pulses up to now come again, as often as there are so many.
     If the block never rests, and v₁ > V₀, each of N pulses adds e = v₁ − V₀ to V, and the last
     slides to its stop:
 
@@ -194,13 +194,17 @@ def repeat(batch: Batch, options: Options) -> int:
         term = (series if alike else cycle) - batch.lost[j]
         total = batch.total[j] + term
         batch.lost[j] = (total - batch.total[j]) - term
+        again = goes_on & (not alike) & (batch.solved[j] > 0.0)
+        passed = options.cycles - later
+        periods = math.floor(later / passed) if again & (left == 0.0) else 0.0
+        total *= 1.0 + periods
         batch.total[j] = total if goes_on else batch.total[j]
         peak = batch.peak_velocity[j] + (later * more if alike else 0.0)
         batch.highest[j] = max(batch.highest[j], peak) if goes_on else batch.highest[j]
         moves = goes_on & (left > 0.0) & (later > 0.0)
         batch.validity[j] = NOT_RECOUPLED if moves else batch.validity[j]
-        again = goes_on & (not alike) & (batch.solved[j] > 0.0)
-        batch.pulses[j] = later if again else 0.0
+        remaining = later - periods * passed
+        batch.pulses[j] = remaining if again else 0.0
         batch.entered[j] = left
-        others += 1 if again else 0
+        others += 1 if batch.pulses[j] > 0.0 else 0
     return others

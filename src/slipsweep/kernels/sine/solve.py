@@ -48,15 +48,32 @@ def append(source: Batch, j: int, cell: int, target: Batch) -> None:
     target.used = k + 1
 
 
+@inlined
+def go_on_alone(source: Batch, k: int, options: Options, alone: Batch) -> None:
+    """Append cell k of a batch to those that are solved alone, with the pulses that it has left."""
+    j = alone.used
+    append(source, k, source.cell[k], alone)
+    pulse.begin(alone, j, options)
+    if source.solved[k] > 0.0:
+        alone.pulses[j] = source.pulses[k]
+        alone.entered[j] = source.entered[k]
+        alone.total[j] = source.total[k]
+        alone.highest[j] = source.highest[k]
+        alone.validity[j] = source.validity[k]
+
+
 @scalar
 def solve_pulses(
     batch: Batch, kind: int, options: Options, base: Base, slide: Slide, log: np.ndarray
 ) -> None:
     """Solve a batch of cells of a kind of stick-slip into `total`, `highest` and `validity`.
 
-    Pulses of another kind, which may follow the first one, are left in `pulses`.
+    Pulses of another kind, which may follow the first one, are left in `pulses`.  Those that are
+    solved alone go on from where they are.
     """
-    pulse.begin(batch, options)
+    if kind != kinds.SLIPS_ALONE:
+        for k in range(WIDTH):
+            pulse.begin(batch, k, options)
     while True:
         if kind == kinds.SLIPS_ALONE:
             rise_alone(batch, options, base, slide, log)
@@ -153,7 +170,7 @@ def solve_kind(
     left = solve_batch(batch, kind, options, base, slide, log, results)
     for k in range(used if kind < kinds.SLIPS_ALONE else 0):
         if not is_solved(batch, k):
-            append(batch, k, batch.cell[k], alone)
+            go_on_alone(batch, k, options, alone)
             if alone.used == WIDTH:
                 left += solve_batch(alone, kinds.SLIPS_ALONE, options, base, slide, log, results)
     return left
@@ -191,6 +208,8 @@ def solve_sine(
                 results[DISPLACEMENT, cell] = at_rest
                 results[PEAK_VELOCITY, cell] = at_rest
             else:
+                if kind == kinds.SLIPS_ALONE:
+                    pulse.begin(batches[kind], batches[kind].used, options)
                 append(loaded, j, cell, batches[kind])
                 if batches[kind].used == WIDTH:
                     left += solve_kind(batches, kind, options, base, slide, log, results)
