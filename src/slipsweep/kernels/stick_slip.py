@@ -302,7 +302,7 @@ def rise(
 ) -> None:
     """Go from a place, where Üg = x, to the top of the rise at the end of piece `last`."""
     top = block.amplitude * base.pieces[last].last
-    follows = block.rise == LITERAL
+    follows = False
     for _ in range(MOST_STAGES * (1 + last - place.piece)):
         if not slide.slides:
             from_yield = max(x, block.yield_acceleration)
@@ -316,7 +316,7 @@ def rise(
             if began <= from_yield:
                 held = min(rising_acceleration(block, block.yield_acceleration, began), began)
             begin_to_slide(slide, held)
-            follows = block.rise == LITERAL
+            follows = False
             x = began
         stage = next_stage(block, x, top, slide.held, follows)
         until = place_of(block, base, stage.end, place, last)
@@ -398,12 +398,18 @@ def recouple(
     following: Place,
     slide: Slide,
     log: np.ndarray,
-) -> None:
-    """Go from Üg = 0, at piece `t5`, to the next pulse or to the stop: option `recoupling`.
+) -> int:
+    """Go from Üg = 0, at piece `t5`, to the next pulse or to the stop; return flags.
 
-    By Eq. 12 with Ümax = b, or with b held on until the shaking ends.  The `following` place lies
-    past the last piece if there is no next pulse.
+    Option `recoupling`: by Eq. 12 with Ümax = b, or with b held on until the shaking ends, and then
+    Eq. 12.  A block that slides with b ≤ 0 does not come to rest, and has no value.  The
+    `following` place lies past the last piece if there is no next pulse.
     """
+    if not slide.slides:
+        return 0
+    if slide.held <= 0.0:
+        slide.displacement = math.nan
+        return KD_NOT_POSITIVE
     count = base.pieces.size
     started = base.pieces[t5].start if t5 < count else base.pieces[count - 1].end
     ends = following.piece >= count
@@ -416,11 +422,12 @@ def recouple(
                 hold(block, piece, curve, piece.begin, end, slide, log)
         started = base.pieces[count - 1].end
     if not slide.slides or (recoupling == INTEGRATE and not ends):
-        return
+        return 0
     duration = math.inf
     if not ends:
         duration = phase_at(base.pieces[following.piece], following.tau) - started
     attenuate(slide.held, base.pieces[0], started, duration, slide, log)
+    return 0
 
 
 @scalar
@@ -491,13 +498,7 @@ def stick_slip_pulse(
         if p < t5:
             x = block.amplitude * base.pieces[p].first
             tau = base.pieces[p].begin
-    if not slide.slides:
-        return 0
-    if slide.held <= 0.0:  # by Eq. 12 the block does not come to rest
-        slide.displacement = math.nan
-        return KD_NOT_POSITIVE
-    recouple(block, recoupling, base, t5, following, slide, log)
-    return 0
+    return recouple(block, recoupling, base, t5, following, slide, log)
 
 
 @inlined
