@@ -302,7 +302,7 @@ def rise(
 ) -> None:
     """Go from a place, where Üg = x, to the top of the rise at the end of piece `last`."""
     top = block.amplitude * base.pieces[last].last
-    follows = False
+    follows = block.rise == LITERAL
     for _ in range(MOST_STAGES * (1 + last - place.piece)):
         if not slide.slides:
             from_yield = max(x, block.yield_acceleration)
@@ -316,7 +316,7 @@ def rise(
             if began <= from_yield:
                 held = min(rising_acceleration(block, block.yield_acceleration, began), began)
             begin_to_slide(slide, held)
-            follows = False
+            follows = block.rise == LITERAL
             x = began
         stage = next_stage(block, x, top, slide.held, follows)
         until = place_of(block, base, stage.end, place, last)
