@@ -243,8 +243,6 @@ def test_what_takes_one_direction_only_refuses_both() -> None:
     block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.4, "frequency": 1.0, "model": BOTH}
     with pytest.raises(InputError, match="simulate: not allowed with sliding = 'both'"):
         slipsweep.simulate(amplitude=3.0, **block)
-    with pytest.raises(InputError, match="limit_amplitude: not allowed with sliding = 'both'"):
-        slipsweep.limit_amplitude(0.05, **block)
     result = sweep(amplitude=[3.0, 4.0], **block)
     with pytest.raises(InputError, match="not allowed with sliding = 'both'"):
         result.slipsweep.chart()

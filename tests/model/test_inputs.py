@@ -30,6 +30,10 @@ FUNCTIONS: dict[str, tuple[Callable[..., xr.Dataset], dict[str, Any]]] = {
         slipsweep.limit_amplitude,
         {"displacement": 0.1, **BLOCK, "frequency": 1.0},
     ),
+    "required_strength": (
+        slipsweep.required_strength,
+        {"displacement": 0.1, "of": "mu_s", "theta": 5.0, "amplitude": 3.0, "frequency": 1.0},
+    ),
     "sample": (slipsweep.sample, {**CELL, "uncertain": UNCERTAIN, "samples": 8}),
 }
 

@@ -414,6 +414,40 @@ def test_the_search_ends_at_five_g_of_the_models_gravity() -> None:
         assert 3.5 * g < found.limit_amplitude[0] < 5.0 * g
 
 
+@pytest.mark.parametrize(
+    "motion", [{"frequency": [0.5, 2.0]}, {"excitation": few_pulses(), "polarity": "both"}]
+)
+def test_limits_both_ways_are_of_the_largest_displacement(motion: dict[str, Any]) -> None:
+    """Reached by the largest |u| over time at the limit, not at the number before, nor below."""
+    both = slipsweep.Newmark(sliding="both")
+    blocks: tuple[dict[str, Any], ...] = (
+        {"theta": [0.0, 6.0], "mu_s": [0.2, 0.5]},
+        {"yield_coefficient": [0.3, 0.05], "upslope_yield_acceleration": 1.0},
+    )
+    for block in blocks:
+        given: dict[str, Any] = {**block, **motion, "model": both}
+        limits = limit_amplitude([0.003, 0.1], **given)
+        assert limits.attrs["criterion"].startswith("largest displacement over time")
+        limit = limits.limit_amplitude
+        assert limit.notnull().all()
+
+        def largest(amplitude: xr.DataArray, given: dict[str, Any] = given) -> xr.DataArray:
+            result = sweep(amplitude=amplitude, **given)
+            downslope: xr.DataArray = result.largest_displacement
+            upslope = -result.smallest_displacement
+            both_ways = downslope.where(downslope > upslope, upslope)
+            return both_ways.transpose(*amplitude.dims, ...)
+
+        assert (largest(limit) >= limits.displacement).all()
+        before = xr.apply_ufunc(np.nextafter, limit, 0.0)
+        assert (largest(before) < limits.displacement).all()
+        shares = xr.DataArray(np.linspace(0.02, 0.999, 300), dims="share")
+        assert (largest(limit * shares) < limits.displacement).all()
+        for name in ("largest_displacement", "smallest_displacement"):
+            at_limit = sweep(amplitude=limit, **given)[name].transpose(*limit.dims)
+            np.testing.assert_array_equal(limits[name], at_limit)
+
+
 SWEEP = """
 [model]
 friction = "newmark"

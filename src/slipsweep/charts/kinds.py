@@ -58,6 +58,7 @@ SORTS: dict[str, tuple[str, tuple[Draw, ...]]] = {
     "record": ("a sweep under a recorded motion", (curves.motions,)),
     "history": ("a time history", (histories.history,)),
     "limit": ("limit amplitudes", (limits.limit,)),
+    "strength": ("required strengths", (limits.strength,)),
     "friction": ("measured friction", (histories.friction,)),
     "calibration": ("a calibration", (histories.calibration,)),
     "hazard": ("annual rates", (limits.hazard,)),

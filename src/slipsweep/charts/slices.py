@@ -20,14 +20,18 @@ from slipsweep.model.variables import PARAMETERS, STATISTIC_COORDINATES, STATIST
 #: Dimensions whose places have names, and no order.
 NAMED = ("case", "motion")
 
-#: Variables by which results of functions other than `sweep` are known, and what those are called.
+#: Variables by which results of functions other than `sweep` are known, one of which they have.
 OTHER_SORTS = {
-    "limit": "limit_amplitude",
-    "calibration": "computed_ground_acceleration",
-    "friction": "friction_ratio",
-    "hazard": "annual_rate",
-    "history": "relative_displacement",
+    "limit": ("limit_amplitude",),
+    "strength": ("required_status", "never_within_count"),
+    "calibration": ("computed_ground_acceleration",),
+    "friction": ("friction_ratio",),
+    "hazard": ("annual_rate",),
+    "history": ("relative_displacement",),
 }
+
+#: Of them, those that have axes to draw over.
+_LIMITS = ("limit", "strength")
 
 #: Most curves of a family, panels across and down, and points of an axis that a figure can show.
 _CURVES = 6
@@ -45,17 +49,18 @@ class Result:
     """A result that is drawn: a dataset, and what it is called in errors.  Only what is drawn of it is read.
 
     `sort` says what it is a result of: "sweep", "statistics", "record", "suite", or one of
-    `OTHER_SORTS`, of which only limits have `variables`, the names of its results, and `dims`,
-    their dimensions.  InputError: it is no result, does not say what was solved, or has other units
-    than slipsweep writes.
+    `OTHER_SORTS`, of which only limits and required strengths have `variables`, the names of its
+    results, and `dims`, their dimensions.  InputError: it is no result, does not say what was
+    solved, or has other units than slipsweep writes.
     """
 
     def __init__(self, data: xr.Dataset, name: str | Path) -> None:
         self.name = str(name)
         self.attrs = data.attrs
         self.sort = _sort(data)
-        check_one_way(f"{name}: charts and explore", data.attrs.get("sliding"))
-        if self.sort in OTHER_SORTS and self.sort != "limit":
+        if self.sort not in _LIMITS:  # these say what they are of
+            check_one_way(f"{name}: charts and explore", data.attrs.get("sliding"))
+        if self.sort in OTHER_SORTS and self.sort not in _LIMITS:
             self.data = data
             self.variables = []
             self.dims = []
@@ -315,8 +320,8 @@ class Result:
 
 
 def _sort(data: xr.Dataset) -> str:
-    for sort, variable in OTHER_SORTS.items():
-        if variable in data:
+    for sort, names in OTHER_SORTS.items():
+        if any(name in data for name in names):
             return sort
     if any(name in STATISTICS for name in data.data_vars):
         return "statistics"

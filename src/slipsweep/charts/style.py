@@ -32,7 +32,11 @@ Look = dict[str, Any]
 
 #: Attributes of all results that charts show, by name; and of all that an axis can have.
 SHOWN = (
-    variables.LIMIT_RESULTS | variables.RECORD_RESULTS | variables.RESULTS | variables.STATISTICS
+    variables.LIMIT_RESULTS
+    | variables.REQUIRED_RESULTS
+    | variables.RECORD_RESULTS
+    | variables.RESULTS
+    | variables.STATISTICS
 )
 _ABOUT = (
     INTENSITY_MEASURES | SHOWN | PARAMETERS | {"displacement": variables.TOLERABLE_DISPLACEMENT}

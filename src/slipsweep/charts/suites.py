@@ -189,9 +189,18 @@ def _sheet(
 
 
 def draw_suite(
-    sheet: Sheet, axes: Axes, xs: Floats, lines: Floats, quantiles: Floats, floor: float = 0.0
+    sheet: Sheet,
+    axes: Axes,
+    xs: Floats,
+    lines: Floats,
+    quantiles: Floats,
+    floor: float = 0.0,
+    band: str = "16 to 84 %",
 ) -> None:
-    """A thin line for each motion of `lines`, and median and band (16, 50 and 84 %) over them, none below `floor`."""
+    """Draw a thin line for each motion of `lines`, and a band with median, none below `floor`.
+
+    `quantiles` are the lower end of the band, the median and the upper end.
+    """
     lines = np.maximum(lines, floor).reshape(-1, xs.size)
     quantiles = np.maximum(quantiles, floor)
     axes.fill_between(xs, quantiles[0], quantiles[2], gid="band", **_BAND)
@@ -201,9 +210,7 @@ def draw_suite(
         axes.plot(xs, edge, gid="edge", **_EDGE)
     plot_curve(axes, xs, quantiles[1], gid="median", **_MEDIAN)
     sheet.legend["median"] = Line2D([], [], **_MEDIAN)
-    sheet.legend["16 to 84 %"] = Patch(
-        facecolor=_BAND["facecolor"], edgecolor=style.BLUE, linestyle="--"
-    )
+    sheet.legend[band] = Patch(facecolor=_BAND["facecolor"], edgecolor=style.BLUE, linestyle="--")
     if len(lines):
         sheet.legend["a motion"] = Line2D([], [], **_THIN)
 

@@ -174,6 +174,17 @@ class LimitStatus(_Status):
     INVALID = 5, "the model gives no value at any amplitude (no limit)"
 
 
+class StrengthStatus(_Status):
+    """How a required strength was found, or why there is none."""
+
+    SOLVED = 0, "the displacement at the required strength is the tolerable one"
+    ALWAYS_WITHIN = (
+        1,
+        "not exceeded at any strength, as where nothing slides: static equilibrium is enough",
+    )
+    NEVER_WITHIN = 2, "exceeded at every strength (no required strength)"
+
+
 class SensitivityStatus(_Status):
     """Whether there are Sobol indices, or why there are none."""
 
@@ -434,6 +445,29 @@ SUITE_STATISTICS: dict[str, dict[str, Any]] = {
     "exceedance_probability": STATISTICS["exceedance_probability"],
 }
 
+#: Inputs that `required_strength` may solve for, and the attributes of what it finds.
+REQUIRED_STRENGTHS: dict[str, dict[str, Any]] = {
+    "yield_coefficient": _cf("1", "required yield coefficient", "required_status"),
+    "mu_s": _cf("1", "required static friction coefficient", "required_status"),
+    "phi": _cf("degree", "required friction angle of the interface", "required_status"),
+}
+
+#: Results of `required_strength`: of each motion or sample, or of all of them together.
+REQUIRED_RESULTS: dict[str, dict[str, Any]] = {
+    **{f"required_{name}": about for name, about in REQUIRED_STRENGTHS.items()},
+    "required_status": _coded("how the required strength was found", StrengthStatus),
+    **{
+        f"required_{name}_quantile": _cf(
+            about["units"],
+            f"quantile of the {about['long_name']}",
+            "always_within_count never_within_count",
+        )
+        for name, about in REQUIRED_STRENGTHS.items()
+    },
+    "always_within_count": _cf("1", "number that stay within at every strength"),
+    "never_within_count": _cf("1", "number that stay within at no strength"),
+}
+
 #: The mean annual rate at which a displacement is exceeded, and its parts that lie outside of the
 #: grid's amplitudes.
 HAZARD_RESULTS: dict[str, dict[str, Any]] = {
@@ -472,6 +506,9 @@ RESULT_DTYPES: dict[str, str] = {
     "half_wave_mode": "int8",
     "validity": "int16",
     "limit_status": "int8",
+    "required_status": "int8",
+    "always_within_count": "int32",
+    "never_within_count": "int32",
     "sensitivity_status": "int8",
     **dict.fromkeys(RECORD_COUNTS, "int32"),
 }

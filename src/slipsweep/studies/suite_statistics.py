@@ -301,7 +301,12 @@ def labels_along(data: xr.Dataset, dim: Hashable, factor: float = 1.0) -> list[s
     return [str(one) if values.dtype.kind not in "iuf" else f"{one * factor:.4g}" for one in values]
 
 
-def point_names(data: xr.Dataset, sizes: Mapping[Any, int]) -> list[str]:
-    """What each point of a grid is called, in order: ``theta = 5, mu_s = 0.3``."""
-    along = ([f"{dim} = {label}" for label in labels_along(data, dim)] for dim in sizes)
+def point_names(
+    data: xr.Dataset, sizes: Mapping[Any, int], factors: Mapping[Any, float] | None = None
+) -> list[str]:
+    """Names of the points of a grid: ``theta = 5, mu_s = 0.3``; numbers times `factors`."""
+    along = (
+        [f"{dim} = {label}" for label in labels_along(data, dim, (factors or {}).get(dim, 1.0))]
+        for dim in sizes
+    )
     return [", ".join(parts) for parts in itertools.product(*along)]

@@ -224,7 +224,7 @@ def plan_samples(
     """Plan of the samples of a grid, drawn and checked; errors as of `slipsweep.sample`."""
     problem = grid_inputs.check_problem(excitation, model, solver)
     options.check_one_way("sample", getattr(problem.model, "sliding", None))
-    _check_drawn(sampling, tuple(inputs.given), problem)
+    check_drawn(sampling, tuple(inputs.given), problem)
     drawn = sampling.distributions
     absolute = [name for name, one in drawn.items() if one.kind == "absolute"]
     # 0.5: a value that every parameter may have
@@ -248,7 +248,7 @@ def plan_samples(
     return SamplePlan(sampling, problem, coords, attrs)
 
 
-def _check_drawn(sampling: Sampling, given: Sequence[str], problem: grid_inputs.Problem) -> None:
+def check_drawn(sampling: Sampling, given: Sequence[str], problem: grid_inputs.Problem) -> None:
     """Refuse to draw what the model or the shaking does not have, what is given as well, and factors on nothing."""
     if "structure_frequency" in given:
         raise InputError(
