@@ -10,7 +10,7 @@ from numba import _dynfunc
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
-from numba.core.typed_passes import NativeLowering
+from numba.core.typed_passes import NativeLowering, NopythonRewrites
 
 
 class LinkedLibrary(JITCodeLibrary):
@@ -56,11 +56,15 @@ class Linked(CompilerBase):
     """The compiler of functions that only kernels call."""
 
     def define_pipelines(self) -> list[Any]:
-        """Return numba's passes, of which the last is the one above."""
+        """Return numba's passes, the lowering above among them.
+
+        Without its rewrites of expressions of whole arrays, of which kernels have none.
+        """
         passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
         passes.passes = [
             (LinkedLowering if step is NativeLowering else step, text)
             for step, text in passes.passes
+            if step is not NopythonRewrites
         ]
         passes.finalize()
         return [passes]
