@@ -24,6 +24,7 @@ USES: dict[str, list[str]] = {
     "a record, then its time history": ["record", "history of a record"],
     "a record, then a waveform, then a time history": ["record", "triangle", "history"],
     "Newmark's block under a record": ["newmark"],
+    "Newmark's block both ways under a record": ["both ways"],
     "a sine by steps": ["steps"],
 }
 
@@ -64,6 +65,9 @@ uses = {
     "history": lambda: slipsweep.simulate(**block, **wave),
     "history of a record": lambda: slipsweep.simulate(**block, excitation=record),
     "newmark": lambda: slipsweep.sweep(**block, excitation=record, model="newmark"),
+    "both ways": lambda: slipsweep.sweep(
+        **block, excitation=record, model=slipsweep.Newmark(sliding="both")
+    ),
     "steps": lambda: slipsweep.sweep(**block, **wave, solver="step"),
 }
 started = time.process_time()

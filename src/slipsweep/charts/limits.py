@@ -256,7 +256,7 @@ def hazard(result: Result, options: Options) -> Figure:
         xscale="log",
         yscale="log",
         xlabel="permanent displacement d (mm)",
-        ylabel="mean annual rate of u > d (1/year)",
+        ylabel=f"mean annual rate of {style.displacement_symbol(rates.attrs)} > d (1/year)",
     )
     panel.grid(color="0.9", which="both")
     for look, name, line, part in zip(curve_looks(len(names)), names, lines, held, strict=True):

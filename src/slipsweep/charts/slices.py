@@ -9,12 +9,18 @@ import numpy as np
 import xarray as xr
 
 from slipsweep.charts.sheet import Sheet
-from slipsweep.charts.solved import DISPLACEMENT, is_newmark, is_recorded, solve, with_amplitude
+from slipsweep.charts.solved import (
+    DISPLACEMENT,
+    by_magnitude,
+    is_newmark,
+    is_recorded,
+    solve,
+    with_amplitude,
+)
 from slipsweep.charts.style import SHOWN, Options, check_attributes
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.motions import read_embedded
 from slipsweep.files.selection import At, Place, axis_labels, between, find
-from slipsweep.model.options import check_one_way
 from slipsweep.model.variables import PARAMETERS, STATISTIC_COORDINATES, STATISTICS
 
 #: Dimensions whose places have names, and no order.
@@ -58,8 +64,6 @@ class Result:
         self.name = str(name)
         self.attrs = data.attrs
         self.sort = _sort(data)
-        if self.sort not in _LIMITS:  # these say what they are of
-            check_one_way(f"{name}: charts and explore", data.attrs.get("sliding"))
         if self.sort in OTHER_SORTS and self.sort not in _LIMITS:
             self.data = data
             self.variables = []
@@ -205,7 +209,7 @@ class Result:
             self.result(solved[0])
         if solved:
             data = data.assign(solve(data, solved, motion=self.motion).data_vars)
-        return data.assign_attrs(picked=picked)
+        return by_magnitude(data.assign_attrs(picked=picked))
 
     def spread(self, dim: str, number: int) -> list[Place]:
         """At most `number` places on an axis, from end to end, in even steps if a few less have them."""
@@ -291,6 +295,7 @@ class Result:
             sheet.set_axis(side)
         if names[0] == DISPLACEMENT:
             sheet.note_slides_back(self.shaking)
+            sheet.note_magnitude()
         return sheet
 
     def _axis(

@@ -38,7 +38,7 @@ _MOST_TILE = 65536
 _POWERS = {
     "permanent_displacement": 2,
     "newmark_displacement": 2,
-    **dict.fromkeys(known.EXTREMES, 2),
+    **dict.fromkeys(known.BOTH_WAYS, 2),
     "peak_relative_velocity": 1,
 }
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 from slipsweep.jit.decorators import inlined, scalar, single
 from slipsweep.jit.elementary import versine
 from slipsweep.kernels.base import base_acceleration, offset_at
-from slipsweep.kernels.block import NEWMARK, Cell, Interface, Options, decay_rate_of
+from slipsweep.kernels.block import Cell, Interface, Options, decay_rate_of
 from slipsweep.kernels.events import root_of
 from slipsweep.kernels.slide import Slide
 from slipsweep.model import equations as eq
@@ -64,21 +64,6 @@ def block_of(cell: Cell, amplitude: float, interface: Interface, options: Option
         decay_rate,
         options.g,
         options.rise,
-    )
-
-
-@scalar
-def held_at_yield(block: Block) -> Block:
-    """Return the block with b = Üy throughout, as it is where E ≤ Üy and no rise begins below Üy."""
-    return Block(
-        block.amplitude,
-        block.yield_acceleration,
-        block.mu_s,
-        block.tan_theta,
-        block.delta_mu,
-        block.decay_rate,
-        block.g,
-        NEWMARK,
     )
 
 

@@ -165,6 +165,7 @@ RESULTS = (
     "continuous_pulses",
     "largest_displacement",
     "smallest_displacement",
+    "clearance",
 )
 
 #: How long a step may be after the onset of a slide (`step_along`); none is cut shorter than the last.
@@ -1144,7 +1145,8 @@ def solve_cell(
         validity &= ~flags.UPSLOPE  # no caution for a block that slides both ways
     if validity & NO_VALUE:
         result[:] = -1.0
-        result[0] = result[1] = result[7] = result[8] = math.nan
+        result[0] = result[1] = math.nan
+        result[7:] = math.nan
         result[3] = float(validity)
         return
     result[0] = block.displacement
@@ -1156,6 +1158,7 @@ def solve_cell(
     result[6] = block.continuous_pulses
     result[7] = max(block.largest_displacement, block.displacement)
     result[8] = min(block.smallest_displacement, block.displacement)
+    result[9] = result[7] - result[8]
 
 
 @single

@@ -96,7 +96,6 @@ class Path(NamedTuple):
     repeats: int
     alike: int  # cycles after the plain one that are as it is, and followed by another such one
     last_alike: bool  # the last cycle is as those, but that none follows
-    rises_once: bool  # w does not rise again within an interval after it fell
     recorded: bool  # time stands in place of the phase, and each pulse has its own friction
 
 
@@ -139,7 +138,6 @@ def path_of(wave: Wave, recorded: bool) -> Path:
         alike=alike,
         # an interval that runs over is cut off by the end of the shaking
         last_alike=bool(last_alike and wave.pieces["last"][-1] <= 0.0),
-        rises_once=not recorded and not _rises_again(wave.pieces),
         recorded=recorded,
     )
 
@@ -160,13 +158,6 @@ def _fill_whole(curves: np.ndarray, pieces: np.ndarray) -> None:
         moment = curve["twice"] @ (finish ** (powers + 2) - begin ** (powers + 2))
         before = curve["once"] @ begin ** (powers + 1)
         curve["whole_twice"] = moment - before * (finish - begin)
-
-
-def _rises_again(pieces: np.ndarray) -> bool:
-    """Return whether a piece of w > 0 rises from above 0 after one that falls."""
-    fell = pieces["first"][:-1] > pieces["last"][:-1]
-    again = (pieces["first"][1:] > 0.0) & (pieces["first"][1:] < pieces["last"][1:])
-    return bool((fell & again).any())
 
 
 def _rises(pieces: np.ndarray) -> np.ndarray:

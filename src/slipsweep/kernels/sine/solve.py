@@ -8,6 +8,7 @@ from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.kernels.block import (
     MONOTONE,
+    NEWMARK,
     NO_VALUE,
     UNSOLVED,
     YIELD_GOVERNS,
@@ -94,6 +95,12 @@ def is_solved(batch: Batch, k: int) -> bool:
 
 
 @inlined
+def goes_on_alone(kind: int, options: Options) -> bool:
+    """Return whether an unsolved cell of a kind is solved alone; Newmark's block has no Eq. 4."""
+    return kind < kinds.SLIPS_ALONE and options.rise != NEWMARK
+
+
+@inlined
 def store_cell(batch: Batch, k: int, kind: int, options: Options, results: np.ndarray) -> None:
     """Write the results of cell k of a batch."""
     cell = batch.cell[k]
@@ -142,7 +149,7 @@ def solve_batch(
     for k in range(used):
         if is_solved(batch, k):
             store_cell(batch, k, kind, options, results)
-        elif kind >= kinds.SLIPS_ALONE:
+        elif not goes_on_alone(kind, options):
             results[VALIDITY, batch.cell[k]] = UNSOLVED
             left += 1
     batch.used = 0
@@ -168,7 +175,7 @@ def solve_kind(
     alone = batches[kinds.SLIPS_ALONE]
     used = batch.used
     left = solve_batch(batch, kind, options, base, slide, log, results)
-    for k in range(used if kind < kinds.SLIPS_ALONE else 0):
+    for k in range(used if goes_on_alone(kind, options) else 0):
         if not is_solved(batch, k):
             go_on_alone(batch, k, options, alone)
             if alone.used == WIDTH:
