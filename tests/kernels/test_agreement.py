@@ -4,8 +4,6 @@ from collections import Counter
 
 import pytest
 
-import slipsweep
-from slipsweep.grid import solvers
 from tests.support.agreement import FLOORS, compare, group_of
 from tests.support.sine_cells import drawn, times_bound
 
@@ -28,12 +26,3 @@ def test_batches_of_the_sine_are_the_walk_of_all_waves() -> None:
         one = drawn(seed, 5_000)
         times = times_bound(one)
         assert times.max() <= 1.0, f"{times.max()} at {one.cell(int(times.argmax()))}"
-
-
-def test_no_cell_of_a_sine_is_left_to_the_walk(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The walk would be compiled for a handful of cells of a chart; of some 300,000 none is left."""
-    monkeypatch.setattr(solvers, "solve_walk", None)
-    for seed in range(100):
-        cells = drawn(seed, 5_000)
-        if cells.model in (slipsweep.Mendez(), slipsweep.Mendez(recoupling="integrate")):
-            cells.swept(cells.cells, walked=False)

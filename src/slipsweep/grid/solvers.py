@@ -11,7 +11,7 @@ from slipsweep.kernels import block as physics
 from slipsweep.kernels import history, newmark, newmark_record, step
 from slipsweep.kernels.grid import CELL, find_parameters
 from slipsweep.kernels.newmark_history import fill_newmark_history
-from slipsweep.kernels.sine.solve import solve_sine, workspace_of_sine
+from slipsweep.kernels.sine.solve import solve_sine
 from slipsweep.kernels.walk import solve_walk, workspace_of
 from slipsweep.model.options import Mendez, Newmark, Step, slides_both_ways
 from slipsweep.model.variables import FRICTION_PARAMETERS
@@ -86,8 +86,7 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
         solve_walk(cells, options, path, *workspace_of(), results)
 
     def under_sine(cells: np.ndarray, results: np.ndarray) -> None:
-        base = cutting.path_of_waveform(Sine()).base
-        if solve_sine(cells, options, base, *workspace_of_sine(), results):
+        if solve_sine(cells, options, results):
             left = np.flatnonzero(results[ROWS["validity"]] == physics.UNSOLVED)
             found = np.empty((len(physics.Motion._fields), left.size))
             under_wave(cells[left], found)
@@ -122,8 +121,7 @@ def newmark_solver(problem: Problem, options: physics.Options, polarity: float) 
         newmark.solve_newmark(cells, options.g, options.wants_peak, path, blocks, results)
 
     def solve_in_batches(cells: np.ndarray, results: np.ndarray) -> None:
-        base = cutting.path_of_waveform(Sine()).base
-        if not solve_sine(cells, options, base, *workspace_of_sine(), results):
+        if not solve_sine(cells, options, results):
             return
         left = np.flatnonzero(results[ROWS["validity"]] == physics.UNSOLVED)
         others = np.full(left.size, math.nan, newmark.NEWMARK_CELL)

@@ -52,8 +52,7 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Decorates a function that Python calls; what it calls is decorated as `slipsweep.jit.decorators` says.
 
     It is compiled by `numba.njit` when first called, or loaded from disk, and runs without the GIL.
-    Its arguments have the same types in every call.  It allocates nothing, and counts no references
-    to its arguments.
+    Its arguments have the same types in every call.
     """
     compiled: Any = function if numba.config.DISABLE_JIT else None
 
@@ -123,7 +122,6 @@ def _compiled_in(folder: Path | None, function: Callable[..., Any], types: tuple
             cache=folder is not None,
             signature_or_function=[types],
             no_cfunc_wrapper=True,
-            _nrt=False,
         )(function)
     finally:
         if collects:

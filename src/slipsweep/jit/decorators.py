@@ -5,8 +5,6 @@ from typing import Any, TypeVar
 
 import numba
 
-from slipsweep.jit.linking import Linked
-
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
@@ -29,12 +27,7 @@ def part(*fastmath: str, **options: Any) -> Callable[[_Function], _Function]:
 #: Options of functions that only kernels call, which takes a quarter of the time to compile them:
 #: Python cannot call them.  They allocate nothing, and count no references to arrays: those are
 #: arguments of a kernel, which outlive it.
-_INTERNAL = {
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
-    "_nrt": False,
-    "pipeline_class": Linked,
-}
+_INTERNAL = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
 
 #: A function that only kernels call.  `contract` lets the compiler fuse a*b + c, `arcp` divide by g
 #: once.  Not `reassoc`: sums whose order the compiler chooses have other last bits in the process

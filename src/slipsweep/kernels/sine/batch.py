@@ -13,8 +13,7 @@ import numpy as np
 
 from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.jit.elementary import angle_minus_sine, half_square_minus_versine, versine
-from slipsweep.kernels.block import Cell, Motion, Options
-from slipsweep.kernels.eq4 import Block
+from slipsweep.kernels.block import Cell, Motion
 from slipsweep.model import equations as eq
 from slipsweep.model.friction import exponential_derivatives
 
@@ -22,9 +21,6 @@ from slipsweep.model.friction import exponential_derivatives
 WIDTH = 32
 
 HALF_PI = 0.5 * math.pi
-
-#: No λ or tan θ is divided by that is smaller.
-LEAST = 1e-150
 
 #: Quantities of the cells of a batch, each (WIDTH,).
 BATCH = np.dtype(
@@ -41,14 +37,12 @@ BATCH = np.dtype(
                 "delta_mu",
                 "decay_rate",
                 "yield_phase",
-                # known of a cell before its motion: μmin, mode, λ by Eq. 6, Eq. 4 at Üg = Üy and at
-                # the peak, and dD/dx there
+                # known of a cell before its motion: μmin, mode, and Eq. 4 at Üg = Üy and at the
+                # peak
                 "minimum_friction",
                 "sliding_mode",
-                "estimate",
                 "response_at_yield",
                 "response_at_peak",
-                "slope_at_peak",
                 # the search for an event: where it is, and whether it has been found
                 "event",
                 "found",
@@ -64,16 +58,6 @@ BATCH = np.dtype(
                 "velocity",
                 "displacement",
                 "peak_velocity",
-                # the pulses: those that are left, V where Üg = Üy in this one, W and the largest V
-                # of those before, and what W lacks of Kahan's sum; 1 if the block slides at the
-                # peak, and if it never rested
-                "pulses",
-                "entered",
-                "total",
-                "lost",
-                "highest",
-                "slides",
-                "never_rests",
                 # continuous sliding (`continuous`)
                 "quarter",
                 "drift",
@@ -135,21 +119,6 @@ def given(batch: Batch, j: int) -> Cell:
         batch.decay_rate[j],
         batch.delta_mu[j],
         batch.minimum_friction[j],
-    )
-
-
-@inlined
-def block_at(batch: Batch, j: int, options: Options) -> Block:
-    """Return the block of cell j of a batch, as the walk takes it."""
-    return Block(
-        batch.amplitude[j],
-        batch.yield_acceleration[j],
-        batch.mu_s[j],
-        batch.tan_theta[j],
-        batch.delta_mu[j],
-        batch.decay_rate[j],
-        options.g,
-        options.rise,
     )
 
 

@@ -11,10 +11,8 @@ import numpy as np
 from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.jit.elementary import rising_phase
 from slipsweep.kernels.block import Options
-from slipsweep.kernels.sine.alone import integrate_eq4_alone, integrate_quarter_alone
 from slipsweep.kernels.sine.batch import (
     HALF_PI,
-    LEAST,
     NODES,
     WEIGHTS,
     WIDTH,
@@ -23,10 +21,6 @@ from slipsweep.kernels.sine.batch import (
     integrate_eq4,
     relative_acceleration,
 )
-from slipsweep.kernels.sine.kinds import CONTINUES_ALONE
-from slipsweep.kernels.slide import Slide
-from slipsweep.model.friction import exponential_inflection
-from slipsweep.motion.paths import Base
 
 #: Coefficients, highest first, of ∫ e^(−k sin φ) dφ over [0, π/2] in powers of 4 − k: integrals of
 #: sinⁿ e^(−4 sin) / n!, all positive.  31 terms give 4e-16 for k from 0 to 6.
@@ -53,7 +47,7 @@ def quarter_integrals(k: float) -> tuple[float, float]:
 
 
 @scalar
-def slide_on(batch: Batch, kind: int, options: Options, base: Base, slide: Slide) -> None:
+def slide_on(batch: Batch, options: Options) -> None:
     """W of N cycles by Eq. 4 throughout.
 
     Over a rising quarter of the cycle let q₀ = ∫ e^(−k sin φ) dφ, q₁ = ∫ sin φ e^(−k sin φ) dφ, k =
@@ -82,15 +76,10 @@ def slide_on(batch: Batch, kind: int, options: Options, base: Base, slide: Slide
         batch.start[j] = -HALF_PI
         batch.end[j] = batch.yield_phase[j]
         batch.level[j] = 0.0
-        batch.highest[j] = math.nan
+        batch.peak_velocity[j] = math.nan
         batch.validity[j] = 0.0
         batch.solved[j] = 1.0
-        batch.pulses[j] = 0.0
-    if kind == CONTINUES_ALONE:
-        integrate_quarter_alone(batch, options, base, slide)
-        integrate_eq4_alone(batch, 1.0, options, base, slide)
-    else:
-        integrate_eq4(batch, 1.0, g)
+    integrate_eq4(batch, 1.0, g)
     later = options.cycles - 1.0
     for j in range(WIDTH):
         missed = batch.gain[j]
@@ -105,53 +94,44 @@ def slide_on(batch: Batch, kind: int, options: Options, base: Base, slide: Slide
             + math.pi * (2.0 * up - missed + down)
         )
         again = 3.0 * up + down - 2.0 * missed + drift * options.cycles
-        batch.total[j] = first + later * math.pi * again
+        batch.displacement[j] = first + later * math.pi * again
         batch.missed[j] = missed
 
 
 @scalar
-def find_peak_velocity(batch: Batch, kind: int, options: Options, base: Base, slide: Slide) -> None:
+def find_peak_velocity(batch: Batch, options: Options) -> None:
     """The largest V of all cycles: where D changes its sign, or at the end of a half cycle.
 
-    D is ∓ g Δμ at Üg = 0.  On the rise of the positive half cycle it is convex and then concave,
-    beyond the inflection of Eq. 4, on the negative one convex (as long as the block does not lift
-    off): it changes its sign once at most.  Where μ = μs it is −tan² θ |Üg|: before the zero on the
-    positive half, behind it on the negative one.  Newton's iteration starts there or at the
-    inflection: at the zero's side from which it passes it once at most.  Up to there V gains ∫ D
-    dψ: the `dip` and the `bump`.  The fall mirrors the rise: D changes its sign back when V has
-    gained what it does in the half cycle, less the dip or the bump.
+    D is ∓ g Δμ at Üg = 0.  On the rise of the positive half cycle it is concave (by
+    `kinds.classify`), on the negative one convex (as long as the block does not lift off): it
+    changes its sign once at most.  Where μ = μs it is −tan² θ |Üg|: before the zero on the positive
+    half, behind it on the negative one, from where Newton's iteration passes it once, and not
+    again.  Up to there V gains ∫ D dψ: the `dip` and the `bump`.  The fall mirrors the rise: D
+    changes its sign back when V has gained what it does in the half cycle, less the dip or the
+    bump.
     """
     cycles = options.cycles
     g = options.g
     for side in (1.0, -1.0):
         for j in range(WIDTH):
-            amplitude = batch.amplitude[j]
-            tan_theta = max(batch.tan_theta[j], LEAST)
-            decay_rate = max(batch.decay_rate[j], LEAST)
-            at_peak, slope = relative_acceleration(batch, j, side * amplitude, g)
-            inflection = exponential_inflection(tan_theta, decay_rate, g) if side > 0.0 else 0.0
-            bend = min(max(inflection, 0.0), amplitude)
+            at_peak, slope = relative_acceleration(batch, j, side * batch.amplitude[j], g)
             turns = side * at_peak > 0.0
-            # of one that has its first sign at the peak: it is below its tangent there
-            highest = side * at_peak - min(slope, 0.0) * (amplitude - bend)
-            batch.solved[j] = batch.solved[j] if turns | (highest <= 0.0) else 0.0
+            # one that has its first sign at the peak may have changed twice, unless it still goes
+            # away from it
+            batch.solved[j] = batch.solved[j] if turns | (slope >= 0.0) else 0.0
             batch.found[j] = 0.0 if turns else 1.0
             # μ = μs after ln(1 + r) e-foldings, r = Δμ/μs, nearly 2r/(2 + r)
             delta_mu = batch.delta_mu[j]
-            at_static = 2.0 * delta_mu * g / ((2.0 * batch.mu_s[j] + delta_mu) * decay_rate)
-            # from the inflection, if D > 0 there; it lies below 0 on the negative half
-            beyond = relative_acceleration(batch, j, bend, g)[0] > 0.0
-            start = bend if beyond else min(max(at_static, bend), amplitude)
-            batch.event[j] = start if turns else 0.0
+            at_static = (
+                2.0 * delta_mu * g / ((2.0 * batch.mu_s[j] + delta_mu) * batch.decay_rate[j])
+            )
+            batch.event[j] = at_static if turns else 0.0
             batch.dip[j] = batch.gain[j]
         find_eq4_event(batch, 0.0, side, g)
         for j in range(WIDTH):
             batch.solved[j] = min(batch.solved[j], batch.found[j])
             batch.end[j] = rising_phase(batch.event[j], batch.amplitude[j])
-        if kind == CONTINUES_ALONE:
-            integrate_eq4_alone(batch, side, options, base, slide)
-        else:
-            integrate_eq4(batch, side, g)
+        integrate_eq4(batch, side, g)
     for j in range(WIDTH):
         dip = batch.dip[j]
         bump = batch.gain[j]
@@ -166,4 +146,4 @@ def find_peak_velocity(batch: Batch, kind: int, options: Options, base: Base, sl
         negative = half + max(max(0.0, other_half), max(bump, other_half - bump))
         peak = max(0.0, max(from_yield, negative) - missed)
         last = drift - missed + max(positive, negative) + max(0.0, (cycles - 2.0) * drift)
-        batch.highest[j] = max(peak, last) if cycles > 1 else peak
+        batch.peak_velocity[j] = max(peak, last) if cycles > 1 else peak

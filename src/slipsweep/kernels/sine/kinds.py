@@ -7,7 +7,7 @@ import numpy as np
 
 from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.jit.elementary import rising_phase
-from slipsweep.kernels.block import MONOTONE, NEWMARK, Options, given_or, interface_of
+from slipsweep.kernels.block import MONOTONE, NEWMARK, Options, decay_rate_of, interface_of
 from slipsweep.kernels.sine.batch import (
     MOST_E_FOLDINGS,
     SLIDING_MODE,
@@ -20,15 +20,14 @@ from slipsweep.kernels.sine.batch import (
 from slipsweep.model import equations as eq
 from slipsweep.model.equations import CONTINUOUS, STICK_SLIP, STUCK
 
-#: Kinds of stick-slip, by b from Üg = Üy to the peak: Üy throughout (Newmark's block, too); Üy and
-#: then Eq. 4; at rest until Eq. 4 falls below Üg, and then Eq. 4; and any other (`alone`).
-HELD_AT_YIELD, YIELDS, STICKS_AT_YIELD, SLIPS_ALONE = range(4)
-#: Continuous sliding, and that with friction that falls in a thin layer (`alone`).
-CONTINUES, CONTINUES_ALONE = range(4, 6)
-#: Each of these kinds has a batch.
-KINDS = 6
-#: No motion: stuck, without a value, or as Eq. 4 does not fall below Üg.
-RESTS = 6
+#: Kinds of motion that batches are made of: from Üg = Üy to the peak b = Üy throughout (Newmark's
+#: block, too), or b = Üy and then Eq. 4, or at rest until Eq. 4 falls below Üg; and Eq. 4 all the
+#: time.
+YIELD_GOVERNS, FOLLOWS_EQ4, STICKS_AT_YIELD, SLIDES_ON = range(4)
+KINDS = 4
+#: No motion: stuck, without a value, or as Eq. 4 does not fall below Üg; and any other.
+RESTS = 4
+OTHER = 5
 
 
 @inlined
@@ -57,28 +56,27 @@ def pulse_kind(batch: Batch, j: int, g: float) -> int:
     )
     smooth = (batch.response_at_peak[j] < end) & (convex | (rises & lags))
     gentle = decay_rate * end <= MOST_E_FOLDINGS * g
-    kind = (STICKS_AT_YIELD if sticks else YIELDS) if gentle else SLIPS_ALONE
-    kind = HELD_AT_YIELD if (not sticks) & (not follows) else kind
-    return kind if smooth else SLIPS_ALONE
+    kind = (STICKS_AT_YIELD if sticks else FOLLOWS_EQ4) if gentle else OTHER
+    kind = YIELD_GOVERNS if (not sticks) & (not follows) else kind
+    return kind if smooth else OTHER
 
 
 @inlined
-def stays_with_base(batch: Batch, j: int) -> bool:
+def stays_with_base(batch: Batch, j: int, g: float) -> bool:
     """Whether Eq. 4 keeps a block with the base up to the peak: D is nowhere above 0 from Üy on.
 
     D is convex, then concave: nowhere larger than at Üy or than its tangent at the peak.
     """
     start = batch.yield_acceleration[j]
     peak = batch.amplitude[j]
-    rate = peak - batch.response_at_peak[j]
-    highest = rate - min(batch.slope_at_peak[j], 0.0) * (peak - start)
+    rate, slope = relative_acceleration(batch, j, peak, g)
+    highest = rate - min(slope, 0.0) * (peak - start)
     return (batch.response_at_yield[j] >= start) & (highest <= 0.0)
 
 
 @scalar
 def classify(batch: Batch, first: int, options: Options, results: np.ndarray) -> None:
     """The block of each cell of a batch and the kind of its motion; mode and a-priori validity go into the results."""
-    # loops of their own, and no branches in them, so that they become SIMD
     g = options.g
     slides = 0
     for j in range(WIDTH):
@@ -96,28 +94,25 @@ def classify(batch: Batch, first: int, options: Options, results: np.ndarray) ->
     if slides == 0:
         return
     for j in range(WIDTH):
-        batch.estimate[j] = eq.decay_rate(
-            batch.amplitude[j], batch.mu_s[j], batch.delta_mu[j], batch.minimum_friction[j], g
+        batch.decay_rate[j] = decay_rate_of(
+            given(batch, j), batch.delta_mu[j], batch.minimum_friction[j], g
         )
-    for j in range(WIDTH):
-        batch.decay_rate[j] = given_or(batch.decay_rate[j], batch.estimate[j])
         batch.yield_phase[j] = rising_phase(batch.yield_acceleration[j], batch.amplitude[j])
     if options.rise == NEWMARK:
         for j in range(WIDTH):
-            batch.kind[j] = HELD_AT_YIELD if batch.sliding_mode[j] == STICK_SLIP else RESTS
+            batch.kind[j] = YIELD_GOVERNS if batch.sliding_mode[j] == STICK_SLIP else RESTS
         return
     for j in range(WIDTH):
         start = batch.yield_acceleration[j]
+        end = batch.amplitude[j]
         batch.response_at_yield[j] = start - relative_acceleration(batch, j, start, g)[0]
+        batch.response_at_peak[j] = end - relative_acceleration(batch, j, end, g)[0]
     for j in range(WIDTH):
-        peak = batch.amplitude[j]
-        rate, slope = relative_acceleration(batch, j, peak, g)
-        batch.response_at_peak[j] = peak - rate
-        batch.slope_at_peak[j] = slope
-    for j in range(WIDTH):
-        gentle = batch.decay_rate[j] * batch.amplitude[j] <= MOST_E_FOLDINGS * g
-        slips = pulse_kind(batch, j, g) if options.rise == MONOTONE else SLIPS_ALONE
-        slips = RESTS if stays_with_base(batch, j) else slips
-        kind = slips if batch.sliding_mode[j] == STICK_SLIP else RESTS
-        continues = CONTINUES if gentle else CONTINUES_ALONE
-        batch.kind[j] = continues if batch.sliding_mode[j] == CONTINUOUS else kind
+        if batch.sliding_mode[j] == STICK_SLIP:
+            kind = pulse_kind(batch, j, g) if options.rise == MONOTONE else OTHER
+            batch.kind[j] = RESTS if stays_with_base(batch, j, g) else kind
+        elif batch.sliding_mode[j] == CONTINUOUS:
+            gentle = batch.decay_rate[j] * batch.amplitude[j] <= MOST_E_FOLDINGS * g
+            # for the peak velocity D has to be concave (`continuous`)
+            concave = batch.decay_rate[j] >= 2.0 * batch.tan_theta[j]
+            batch.kind[j] = SLIDES_ON if gentle & (concave | (not options.wants_peak)) else OTHER

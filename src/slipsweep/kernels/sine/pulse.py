@@ -1,16 +1,15 @@
-"""Stick-slip under a sine: a pulse from its onset to the stop, and all pulses.
+"""Stick-slip under a sine: a pulse from its onset to the stop, and all cycles.
 
 Rules of the motion: docs/model.md.  ψ is the phase from the peak of the pulse.
 """
 
 import math
 
-from slipsweep.jit.decorators import inlined, scalar
+from slipsweep.jit.decorators import scalar
 from slipsweep.jit.elementary import angle_minus_sine, rising_phase
 from slipsweep.kernels.block import INTEGRATE, NOT_RECOUPLED, Options
 from slipsweep.kernels.sine.batch import (
     HALF_PI,
-    LEAST,
     WIDTH,
     Batch,
     find_eq4_event,
@@ -20,23 +19,12 @@ from slipsweep.kernels.sine.batch import (
     integrate_eq4,
     relative_acceleration,
 )
-from slipsweep.kernels.sine.kinds import HELD_AT_YIELD, STICKS_AT_YIELD
+from slipsweep.kernels.sine.kinds import STICKS_AT_YIELD, YIELD_GOVERNS
 from slipsweep.model import equations as eq
 from slipsweep.model.friction import exponential_inflection
 
-
-@inlined
-def begin(batch: Batch, j: int, options: Options) -> None:
-    """Set a cell of a batch to the beginning of the motion, at rest."""
-    batch.pulses[j] = options.cycles
-    batch.entered[j] = 0.0
-    batch.total[j] = 0.0
-    batch.lost[j] = 0.0
-    batch.highest[j] = 0.0 if options.wants_peak else math.nan
-    batch.slides[j] = 1.0
-    batch.never_rests[j] = 1.0
-    batch.solved[j] = 1.0
-    batch.validity[j] = 0.0
+#: No λ or tan θ is divided by that is smaller.
+_LEAST = 1e-150
 
 
 @scalar
@@ -47,21 +35,22 @@ def begin_to_slide(batch: Batch, kind: int, g: float) -> None:
     docs/numerics.md#onset-and-switch
     """
     for j in range(WIDTH):
+        batch.solved[j] = 1.0
+        batch.validity[j] = 0.0
         batch.level[j] = batch.yield_acceleration[j]
         batch.start[j] = batch.yield_phase[j]
     if kind != STICKS_AT_YIELD:
         return
     for j in range(WIDTH):
         # from where D ceases to be convex: beyond the root before it, and before the root beyond it
-        tan_theta = max(batch.tan_theta[j], LEAST)
-        decay_rate = max(batch.decay_rate[j], LEAST)
+        tan_theta = max(batch.tan_theta[j], _LEAST)
+        decay_rate = max(batch.decay_rate[j], _LEAST)
         bend = exponential_inflection(tan_theta, decay_rate, g)
         batch.event[j] = min(max(bend, batch.yield_acceleration[j]), batch.amplitude[j])
         batch.found[j] = 0.0
     find_eq4_event(batch, 0.0, 1.0, g)
     for j in range(WIDTH):
         batch.solved[j] = batch.found[j]
-        batch.never_rests[j] = 0.0
         batch.level[j] = batch.event[j]
         batch.start[j] = rising_phase(batch.event[j], batch.amplitude[j])
 
@@ -73,7 +62,7 @@ def rise(batch: Batch, kind: int, g: float) -> None:
     b is held up to E = b, the switch, and follows Eq. 4 beyond it.
     docs/numerics.md#onset-and-switch
     """
-    if kind == HELD_AT_YIELD:
+    if kind == YIELD_GOVERNS:
         for j in range(WIDTH):
             batch.held[j] = batch.level[j]
             gained = held_gains(batch.amplitude[j], batch.level[j], batch.start[j], 0.0)
@@ -115,12 +104,10 @@ def fall(batch: Batch, options: Options) -> None:
     eq12 = options.recoupling != INTEGRATE
     missing = 0
     for j in range(WIDTH):
-        slides = batch.slides[j] > 0.0
         at_t5 = batch.velocity[j] + batch.amplitude[j] - HALF_PI * batch.held[j]
-        at_t5 = at_t5 if slides else 0.0
-        found = (eq12 & (at_t5 > 0.0)) | (not slides)
+        found = eq12 & (at_t5 > 0.0)
         batch.gain[j] = at_t5
-        batch.event[j] = HALF_PI if slides else 0.0
+        batch.event[j] = HALF_PI
         batch.found[j] = 1.0 if found else 0.0
         batch.peak_velocity[j] = math.nan
         missing += 0 if found else 1
@@ -139,10 +126,8 @@ def fall(batch: Batch, options: Options) -> None:
                 2.0 * longest / (1.0 + math.sqrt(1.0 + 2.0 * curvature * longest)), math.pi
             )
             beyond = HALF_PI if eq12 else after_t5
-            stop = beyond if at_t5 > 0.0 else before_t5
-            slides = batch.slides[j] > 0.0
-            batch.event[j] = stop if slides else 0.0
-            batch.peak_velocity[j] = peak if slides & options.wants_peak else math.nan
+            batch.event[j] = beyond if at_t5 > 0.0 else before_t5
+            batch.peak_velocity[j] = peak if options.wants_peak else math.nan
     if missing > 0:
         find_stop(batch, HALF_PI if eq12 else 3.0 * HALF_PI)
     for j in range(WIDTH):
@@ -154,57 +139,36 @@ def fall(batch: Batch, options: Options) -> None:
 
 
 @scalar
-def repeat(batch: Batch, options: Options) -> int:
-    """Eq. 12 from t5 on, and the pulses alike: W (`total`) and the largest V; cells with others left.
+def repeat(batch: Batch, kind: int, options: Options) -> None:
+    """Eq. 12 from t5 on, and all cycles: W, and the largest V.
 
-    By integration the block is at rest within the cycle, and all are alike.  For Eq. 12 let V₀ be
-    V at Üg = Üy, L be V and M be W at t5, v₁ what is left of L at the next Üg = Üy, h the phase
-    from Üg = Üy to t5, and W₀ = M + (L² − v₁²)/(2b).  If v₁ = V₀ the next pulse is like this one.
-    If v₁ = 0 all pulses up to now come again, as often as there are so many.
-    If the block never rests, and v₁ > V₀, each of N pulses adds e = v₁ − V₀ to V, and the last
-    slides to its stop:
+    By integration the block is at rest within the cycle, and all are alike.  For Eq. 12 let L be V
+    and M be W at t5, v₁ what is left of L at the next Üg = Üy, h the phase from Üg = Üy to t5, and
+    W₀ = M + (L² − v₁²)/(2b).  Where a block that moves at Üg = Üy goes on as one at rest does, with
+    b = Üy, each of N cycles adds v₁ to V, and the last slides to its stop:
 
-        W = (N − 1)(W₀ + π e (N − 2)) + M + (N − 1) e h + (L + (N − 1) e)²/(2b)
+        W = (N − 1)(W₀ + π v₁ (N − 2)) + M + (N − 1) v₁ h + (L + (N − 1) v₁)²/(2b)
 
-    docs/numerics.md#batches-of-the-sine
+    A block that sticks at Üg = Üy when at rest does not when it moves: such a cell is left to the
+    general kernel. docs/numerics.md#batches-of-the-sine
     """
     if options.recoupling == INTEGRATE:
         for j in range(WIDTH):
-            batch.total[j] = batch.displacement[j] * options.cycles
-            batch.highest[j] = max(batch.highest[j], batch.peak_velocity[j])
-            batch.pulses[j] = 0.0
-        return 0
-    others = 0
+            batch.displacement[j] *= options.cycles
+        return
+    later = options.cycles - 1.0
     for j in range(WIDTH):
         held = batch.held[j]
         at_t5 = batch.velocity[j]
         to_t5 = batch.displacement[j]
-        goes_on = batch.pulses[j] > 0.0
-        later = batch.pulses[j] - 1.0
         pause = 3.0 * HALF_PI + batch.yield_phase[j]
         left = eq.attenuated_velocity(at_t5, held, pause)
         cycle = to_t5 + eq.attenuated_displacement(at_t5, held, pause)
-        more = left - batch.entered[j]
-        alike = (more == 0.0) | ((batch.never_rests[j] > 0.0) & (more > 0.0)) | (later == 0.0)
-        last_at_t5 = at_t5 + later * more
-        last = to_t5 + later * more * (HALF_PI - batch.yield_phase[j])
+        last_at_t5 = at_t5 + later * left
+        last = to_t5 + later * left * (HALF_PI - batch.yield_phase[j])
         last += eq.attenuated_displacement(last_at_t5, held, math.inf)
-        series = later * (cycle + math.pi * more * (later - 1.0)) + last
-        # added by Kahan's sum: there may be a million pulses
-        term = (series if alike else cycle) - batch.lost[j]
-        total = batch.total[j] + term
-        batch.lost[j] = (total - batch.total[j]) - term
-        again = goes_on & (not alike) & (batch.solved[j] > 0.0)
-        passed = options.cycles - later
-        periods = math.floor(later / passed) if again & (left == 0.0) else 0.0
-        total *= 1.0 + periods
-        batch.total[j] = total if goes_on else batch.total[j]
-        peak = batch.peak_velocity[j] + (later * more if alike else 0.0)
-        batch.highest[j] = max(batch.highest[j], peak) if goes_on else batch.highest[j]
-        moves = goes_on & (left > 0.0) & (later > 0.0)
-        batch.validity[j] = NOT_RECOUPLED if moves else batch.validity[j]
-        remaining = later - periods * passed
-        batch.pulses[j] = remaining if again else 0.0
-        batch.entered[j] = left
-        others += 1 if batch.pulses[j] > 0.0 else 0
-    return others
+        batch.displacement[j] = later * (cycle + math.pi * left * (later - 1.0)) + last
+        batch.peak_velocity[j] += later * left
+        moves = (left > 0.0) & (later > 0.0)
+        batch.validity[j] = NOT_RECOUPLED if moves else 0.0
+        batch.solved[j] = 0.0 if moves & (kind == STICKS_AT_YIELD) else batch.solved[j]
