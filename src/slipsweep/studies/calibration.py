@@ -15,6 +15,7 @@ from slipsweep.studies import friction
 from slipsweep.studies.estimate import Estimate, cycle_estimate, estimate
 from slipsweep.studies.friction import Floats
 from slipsweep.studies.likelihood import SOUGHT, Observation, runs_of
+from slipsweep.studies.noise import flat_top
 
 #: The peak of a cycle at least, and what a table that moves exceeds, in parts of its largest
 #: acceleration; fewest samples of a cycle.
@@ -163,8 +164,9 @@ def calibrate(
 def _of_test(one: Observation, found: Estimate, cycles: bool) -> xr.Dataset:
     """What belongs to one test: measured and computed series, misfits, cycles; the attribute `removed`."""
     test = one.test
-    history = one.forward(found.parameters, one.test.times)
-    added, removed = _removed(one, found.parameters)
+    parameters = found.of_test(one)
+    history = one.forward(parameters, one.test.times)
+    added, removed = _removed(one, found)
     about = variables.CALIBRATION_SERIES | variables.MEASURED_FRICTION
     series = {f"measured_{name}": values - added[name] for name, values in test.channels.items()}
     series |= {f"computed_{name}": values for name, values in history.items()}
@@ -177,7 +179,7 @@ def _of_test(one: Observation, found: Estimate, cycles: bool) -> xr.Dataset:
         )
         series["free_body_friction"] = friction.free_body_friction(block, one.theta, one.model.g)
     data: dict[str, Any] = {name: ("time", values, about[name]) for name, values in series.items()}
-    for name, misfit in zip(one.channels, one.misfits(found.parameters), strict=True):
+    for name, misfit in zip(one.channels, one.misfits(parameters), strict=True):
         span = max(float(np.nanmax(np.abs(history[name]))), 1e-300)
         long_name = (
             f"root mean square of measured less computed {variables.HISTORY[name]['long_name']}"
@@ -196,12 +198,14 @@ def _of_test(one: Observation, found: Estimate, cycles: bool) -> xr.Dataset:
     return dataset.merge(_cycles(one, found)) if cycles else dataset
 
 
-def _removed(one: Observation, parameters: Floats) -> tuple[dict[str, Floats], list[str]]:
+def _removed(one: Observation, found: Estimate) -> tuple[dict[str, Floats], list[str]]:
     """What offsets, drifts and steps add to each channel, and each in words with its standard error."""
     added = {name: np.zeros(one.test.times.size) for name in one.test.channels}
     texts = []
-    sizes = np.transpose(one.linear.nuisances(parameters))[one.motion.shapes.shape[1] :]
-    for line, (size, error) in zip(one.lines, sizes, strict=True):
+    of_table = np.transpose(found.lines_of(one))
+    of_block = np.transpose(one.nuisances(found.of_test(one)))[one.wrong.size :]
+    lines = [*one.table_lines, *one.lines]
+    for line, (size, error) in zip(lines, [*of_table, *of_block], strict=True):
         added[line.channel] = added[line.channel] + size * line.values
         units = variables.HISTORY[line.channel]["units"] + " over the whole test" * (
             line.name == "drift"
@@ -214,7 +218,7 @@ def _removed(one: Observation, parameters: Floats) -> tuple[dict[str, Floats], l
 
 def _cycles(one: Observation, found: Estimate) -> xr.Dataset:
     """Each cycle by itself: estimates, standard errors and Kd."""
-    motion = one.motion
+    motion = one.record(found.lines_of(one)[0])
     times = one.test.times
     continuous = "continuous" in found.readings
     least = max(found.parameters[0], _A_CYCLE * one.peak)
@@ -230,20 +234,19 @@ def _cycles(one: Observation, found: Estimate) -> xr.Dataset:
     }
     data["cycle_start"][:] = starts = [motion.times[part.start] for part in pulses]
     data["cycle_peak_acceleration"][:] = [motion.acceleration[part].max() for part in pulses]
-    speed = max(
-        float(np.abs(one.forward(found.parameters, times)["relative_velocity"]).max()), 1e-6
-    )
+    parameters = found.of_test(one)
+    speed = max(float(np.abs(one.forward(parameters, times)["relative_velocity"]).max()), 1e-6)
     for row, (begin, end) in enumerate(zip(starts, [*starts[1:], motion.times[-1]], strict=True)):
         inside = (times >= begin) & (times < end)
         if inside.sum() < _FEWEST_IN_A_CYCLE:
             continue
-        values, errors = cycle_estimate(
-            one.cycle(begin, end, speed), found, [1, 2] if continuous else [0, 1, 2]
-        )
+        of_cycle = one.cycle(begin, end, speed, parameters, found.lines_of(one)[1])
+        values, errors = cycle_estimate(of_cycle, parameters, [1, 2] if continuous else [0, 1, 2])
         for name, value, error in zip(SOUGHT, values, errors, strict=True):
             data[f"cycle_{name}"][row] = value
             data[f"cycle_{name}_error"][row] = error
-        history = one.forward(np.where(np.isfinite(values), values, found.parameters), times)
+        fitted = np.where(np.isfinite(values), values, found.parameters)
+        history = one.forward(np.append(fitted, parameters[3:]), times)
         slides = inside & (history[TABLE] > 0.0)
         if slides.any() and not continuous:
             data["cycle_attenuation_coefficient"][row] = (
@@ -304,10 +307,13 @@ def _report(
     """
     sentence = "" if constant is None else constant.attrs["constant_friction"]
     slides = bool((results["permanent_displacement"] != 0.0).any())
-    said = [sentence] if sentence else [*misfit]
+    clipped = [text for one in found.observations for text in _clipped(one.test)]
+    said = [*clipped, *([sentence] if sentence else misfit)]
+    said += [text for one in found.observations for text in _colours(one)]
     for one in found.observations:
-        first = float(one.motion.acceleration[0])
-        most = float(np.abs(one.motion.acceleration).max())
+        motion = one.table_acceleration(found.lines_of(one)[0])
+        first = float(motion[0])
+        most = float(np.abs(motion).max())
         if abs(first) > max(_MOVES * most, 3.0 * one.motion.noise):
             said.append(
                 f"The table moves as the record begins, at {first:.3g} m/s2. The block is taken to be at rest there. "
@@ -331,9 +337,9 @@ def _report(
         said.append(
             "The computed block does not come to rest before the next slide begins (flag not_recoupled)."
         )
-    if constant is not None:
+    if constant is not None and not clipped:
         tables = _newmark_tables(found.observations[0], constant)
-    elif found.determined.all() and slides and not misfit and not contradictions:
+    elif found.determined.all() and slides and not [*clipped, *misfit, *contradictions]:
         tables = _model_table(found), _uncertainty_table(found)
     else:
         comments = ["WARNING: not ready for use.", *said, "", *_model_table(found).splitlines()]
@@ -369,12 +375,57 @@ def _statics(one: Observation) -> xr.Dataset:
     return friction.coefficients_of(table, block, slides, one.mu_s, one.theta, one.model.g)
 
 
+def _clipped(test: ShakingTest) -> list[str]:
+    """Return which channels are at the end of their range, in words.
+
+    Tops at which a block holds its acceleration or its displacement, or bottoms at which it is at
+    rest, are flat without that.
+    """
+    sides = [
+        (TABLE, 1),
+        (TABLE, -1),
+        ("block_acceleration", -1),
+        ("relative_velocity", 1),
+        ("relative_velocity", -1),
+    ]
+    texts = []
+    for name, sign in ((name, sign) for name, sign in sides if name in test.channels):
+        values = sign * test.channels[name]
+        end = float(np.nanmax(values))
+        samples = flat_top(values) if end > _MOVES * float(np.nanmax(np.abs(values))) else 0
+        if samples:
+            units = variables.HISTORY[name]["units"]
+            texts.append(
+                f"{test.name}: {name} is flat at its {'largest' if sign > 0 else 'smallest'} value, "
+                f"{sign * end:.4g} {units}, for {samples} samples, as of a sensor or converter at the "
+                "end of its range. What is cut off is not known, and the intervals do not include it: "
+                "test with a larger range."
+            )
+    return texts
+
+
+def _colours(one: Observation) -> list[str]:
+    """Return a sentence on coloured noise, if there is some."""
+    colours = {TABLE: one.motion.colour} | dict(zip(one.channels, one.colour, strict=True))
+    listed = ", ".join(f"{name} {colour:.2f}" for name, colour in colours.items() if colour > 0.0)
+    if not listed:
+        return []
+    return [
+        f"{one.test.name}: noise is coloured, neighbouring samples of it have a correlation: {listed}. "
+        "The intervals include this as noise of first order."
+    ]
+
+
 def _misfits(found: Estimate) -> dict[str, float]:
     """Channels whose misfit is more than 1.5 times their noise and 1 % of their largest value, and how many times."""
     worse: dict[str, float] = {}
     for one in found.observations:
         of_channels = zip(
-            one.channels, one.misfits(found.parameters), one.sensor_noise, one.largest, strict=True
+            one.channels,
+            one.misfits(found.of_test(one)),
+            one.sensor_noise,
+            one.largest,
+            strict=True,
         )
         for name, misfit, noise, largest in of_channels:
             if misfit > max(1.5 * noise, 0.01 * largest):
@@ -388,8 +439,8 @@ def _misfit(found: Estimate, with_drift: Callable[[str], Estimate]) -> list[str]
         return []
     listed = ", ".join(f"{name} {times:.2g} times" for name, times in misfits.items())
     said = [
-        f"The misfit is larger than the noise of the sensors: {listed}. The block did not move as in the model, or a "
-        "sensor drifts: do not use the parameters before you know why (see the figure)."
+        f"The misfit is larger than the noise of the sensors: {listed}. The block did not move as in the model, "
+        "a sensor drifts, or its noise is slow: do not use the parameters before you know why (see the figure)."
     ]
     for name in RESPONSES:
         may_drift = all(
@@ -402,7 +453,7 @@ def _misfit(found: Estimate, with_drift: Callable[[str], Estimate]) -> list[str]
 
 
 def _contradiction(found: Estimate, one: Observation) -> list[str]:
-    """A lower bound of Üy that is larger than the accelerations at which the block was seen to begin to slide."""
+    """Say if the interval of Üy begins above the accelerations at which the block was seen to begin to slide."""
     if "block_acceleration" not in one.channels or "continuous" in found.readings:
         return []
     times = one.test.times
@@ -420,8 +471,8 @@ def _contradiction(found: Estimate, one: Observation) -> list[str]:
     least = found.intervals[0][0]
     seen = np.median(onsets)
     text = (
-        f"Üy is at least {least:.3g} m/s2 by the fit, but the block was seen to begin to slide at {seen:.3g} m/s2: the "
-        "fit contradicts the test."
+        f"The 95 % interval of Üy begins at {least:.3g} m/s2, but the block was seen to begin to slide at {seen:.3g} m/s2: "
+        "the fit contradicts the test."
     )
     return (
         [text]
@@ -437,6 +488,7 @@ def _undetermined(found: Estimate) -> list[str]:
     *others, last = (_SYMBOL[at] for at in missing)
     listed, are = (f"{', '.join(others)} and {last}", "are") if others else (last, "is")
     ranges = "; ".join(f"{_SYMBOL[at]} {_range(*found.intervals[at])}{_UNIT[at]}" for at in missing)
+    apart = " or ".join(f"{onset:.3g}" for onset in found.apart)
     yields = "held" in found.readings and not math.isfinite(found.intervals[1][1])
     crosses = bool({"crossed", "crossing"} & found.readings)
     why = {
@@ -457,9 +509,14 @@ def _undetermined(found: Estimate) -> list[str]:
         ): "Where Eq. 4 holds the block to the table until the table's acceleration has passed Üy, the "
         "motion does not depend on Üy.",
     }.get((yields, crosses), "")
+    two = (
+        f"Üy is about {apart} m/s2, and no value between: from either the block gains the same velocity."
+        if apart
+        else ""
+    )
     return [
-        f"{listed} {are} not determined by {tests}: {ranges}.",
-        *([why] if why else []),
+        f"{listed} {are} not determined by {tests}: 95 % intervals {ranges}.",
+        *filter(None, [two, why]),
         _remedy(found),
     ]
 
@@ -556,7 +613,9 @@ def _newmark_tables(one: Observation, coefficients: xr.Dataset) -> tuple[str, st
         f'[model]\nfriction = "newmark"\nyield_acceleration = {_number(value)}  # 95 %: {low:.4g} to {high:.4g} m/s2\n'
         f"g = {one.model.g:g}\n"
     )
-    lines = _normal("yield_acceleration", value, max((high - low) / 3.92, 1e-6 * value))
+    lines = _normal(
+        "yield_acceleration", value, max((high - low) / (2.0 * friction.QUANTILE), 1e-6 * value)
+    )
     return model, "\n".join(["[uncertainty]", *lines]) + "\n"
 
 
