@@ -406,7 +406,7 @@ def _clipped(test: ShakingTest) -> list[str]:
 
 def _colours(one: Observation) -> list[str]:
     """Return a sentence on coloured noise, if there is some."""
-    colours = {TABLE: one.motion.colour} | dict(zip(one.channels, one.colour, strict=True))
+    colours = {f"{TABLE} up to": one.motion.colour} | dict(zip(one.channels, one.colour, strict=True))
     listed = ", ".join(f"{name} {colour:.2f}" for name, colour in colours.items() if colour > 0.0)
     if not listed:
         return []
@@ -420,10 +420,11 @@ def _misfits(found: Estimate) -> dict[str, float]:
     """Channels whose misfit is more than 1.5 times their noise and 1 % of their largest value, and how many times."""
     worse: dict[str, float] = {}
     for one in found.observations:
+        parameters = found.of_test(one)
         of_channels = zip(
             one.channels,
-            one.misfits(found.of_test(one)),
-            one.sensor_noise,
+            one.misfits(parameters),
+            one.noise_seen(parameters),
             one.largest,
             strict=True,
         )

@@ -424,7 +424,9 @@ def estimate(observations: Sequence[Observation]) -> Estimate:
     slopes = scale.slopes(search.best)
     covariance = _covariance(search.slopes(search.best)) * np.outer(slopes, slopes)
     deviations = np.sqrt(np.diag(covariance))
-    correlation = covariance / np.outer(deviations, deviations)
+    # no correlation with a parameter that only samples beside jumps bound
+    correlation = np.nan_to_num(covariance / np.outer(deviations, deviations))
+    np.fill_diagonal(correlation, 1.0)
     errors = _errors(deviations[:3], low, high)
     return Estimate(
         best,

@@ -28,7 +28,14 @@ from slipsweep.motion.cutting import wave_of_record
 from slipsweep.motion.records import Record
 from slipsweep.motion.shaking import RESPONSES, TABLE, ShakingTest, check_channels
 from slipsweep.studies.friction import Floats, check_contact, noise_of
-from slipsweep.studies.noise import LEAST_NOISE, colour_of, converter_noise, distances, whitened
+from slipsweep.studies.noise import (
+    LEAST_NOISE,
+    colour_of,
+    converter_noise,
+    distances,
+    is_first_order,
+    whitened,
+)
 from slipsweep.studies.table import table_motion
 
 #: The series of `HISTORY` at some times, for Üy, λ and Δμ.
@@ -108,7 +115,8 @@ class Observation:
     not depend on them linearly.
 
     `channels` of the block have the noise `sensor_noise` as neighbouring samples, or those at rest,
-    scatter, or as given, and of their residuals neighbours have the correlations `colour`.  `drifts` may drift:
+    scatter, or as given; the fit estimates `noise`, and the correlations `colour` of neighbouring
+    residuals.  `drifts` may drift:
     those given and `drifting`.  `lines` are offsets, drifts and steps of the block's channels.
     `table_factor` is how many times the noise of the table's record its errors are.  `upslope` are
     the times at which slips begin that are left out.  `forward` and `linear` are the
@@ -154,7 +162,7 @@ class Observation:
         self._given_noise = np.array([noise.get(name, np.nan) for name in self.channels])
         scatter = np.maximum([noise_of(values) for values in measured], self._least_noise)
         self.motion = table_motion(test.times, test.channels[TABLE])
-        self._noise = np.where(np.isnan(self._given_noise), scatter, self._given_noise)
+        self.noise = np.where(np.isnan(self._given_noise), scatter, self._given_noise)
         at_rest = measured[:, test.times < self.motion.begins]
         if at_rest.shape[1] >= _AT_REST:  # slow noise is not seen in neighbouring samples
             scatter = np.fmax(scatter, np.nanstd(at_rest, axis=1))
@@ -237,7 +245,7 @@ class Observation:
         """
         self.forward = self._forward()
         self._counted = self._use & ~self._beside_jumps
-        noise = np.maximum(self._noise, rough * self.largest)
+        noise = np.maximum(self.noise, rough * self.largest)
         self._scale = (self._weights / noise[:, None])[self._counted]
         apart = [distances(self.test.times[counted]) for counted in self._counted]
         colours = [0.0 if rough else colour for colour in self.colour]
@@ -310,6 +318,20 @@ class Observation:
         rests = zip(self._unexplained(parameters), self._by_channel(self._scale), strict=True)
         return [float(np.sqrt(np.mean((rest / scale) ** 2))) for rest, scale in rests]
 
+    def noise_seen(self, parameters: Floats) -> list[float]:
+        """Return the noise of each channel that does not rest on the model.
+
+        It is `sensor_noise`; or, if the residuals are noise of first order, their size.
+        """
+        rests = self._unexplained(parameters)
+        links = self._by_channel(self._links)
+        seen = []
+        for at, (rest, link) in enumerate(zip(rests, links, strict=True)):
+            coloured = self.colour[at] > 0.0 and is_first_order(whitened(rest, link))
+            size = max(self.sensor_noise[at], self.noise[at] * coloured)
+            seen.append(float(size if np.isnan(self._given_noise[at]) else self.sensor_noise[at]))
+        return seen
+
     def cycle(
         self, begin: float, end: float, speed: float, parameters: Floats, table_errors: Floats
     ) -> Callable[[Floats], Floats]:
@@ -349,12 +371,12 @@ class Observation:
         links = self._by_channel(self._links)
         sizes = self.nuisances(parameters)[0]
         for at, (rest, part) in enumerate(zip(rests, leverage, strict=True)):
-            weight = weights[at] * self._noise[at]
+            weight = weights[at] * self.noise[at]
             freedom = float(np.sum(weight**2)) - float(np.sum(part)) - 1.0
             square = float(np.sum(whitened(rest, links[at]) ** 2))
             if np.isnan(self._given_noise[at]) and freedom > 0.0:
-                self._noise[at] = max(
-                    self._noise[at] * np.sqrt(square / freedom), self._least_noise[at]
+                self.noise[at] = max(
+                    self.noise[at] * np.sqrt(square / freedom), self._least_noise[at]
                 )
             self.colour[at] = colour_of(rest, distances(self.test.times[self._counted[at]]))
         self.wrong = sizes[: self.wrong.size]
@@ -390,7 +412,7 @@ class Observation:
         """Find the samples beside jumps of the block's acceleration, as computed for some parameters."""
         if "block_acceleration" in self.channels:
             row = self.channels.index("block_acceleration")
-            beside = [self._next_to_jumps(each, self._noise[row]) for each in solutions]
+            beside = [self._next_to_jumps(each, self.noise[row]) for each in solutions]
             self._beside_jumps[row] = np.any(beside, axis=0)
 
     def _next_to_jumps(self, parameters: Floats, noise: float) -> NDArray[np.bool_]:

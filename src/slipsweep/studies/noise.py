@@ -18,6 +18,11 @@ LEAST_NOISE = 1e-4
 _NO_CHANCE = 4.0
 MOST_COLOUR = 0.98
 
+#: Distances in samples at which residuals are looked at, and the standard deviation of normal noise
+#: over that by its median, at most.
+_LAGS = 10
+_TAILS = 1.25
+
 #: A flat top has so many equal values in turn at least, and so many in all.
 _IN_TURN = 3
 _FLAT = 4
@@ -69,6 +74,22 @@ def colour_of(values: Floats, apart: Floats) -> float:
     correlation = float(np.sum(before * after)) / size
     is_chance = correlation < _NO_CHANCE / before.size**0.5
     return 0.0 if is_chance else min(correlation, MOST_COLOUR)
+
+
+def is_first_order(innovations: Floats) -> bool:
+    """Return whether residuals less what their neighbours say of them are independent and normal.
+
+    Those of a motion that a model misses are not: they are smooth, or few of them are large; and
+    where white noise is added to that, they alternate.
+    """
+    centred = innovations - innovations.mean()
+    square = float(np.sum(centred**2))
+    limit = _NO_CHANCE / centred.size**0.5
+    lags = range(1, min(_LAGS, centred.size // 4) + 1)
+    correlations = [float(centred[lag:] @ centred[:-lag]) / square for lag in lags]
+    typical = 1.4826 * float(np.median(np.abs(centred)))
+    tails = (square / centred.size) ** 0.5 / max(typical, 1e-300)
+    return max(map(abs, correlations)) < limit and tails < _TAILS
 
 
 def flat_top(values: Floats) -> int:
