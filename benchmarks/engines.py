@@ -157,7 +157,7 @@ def _compiled() -> tuple[Any, Any]:
 
     rate = njit(rate_by(np))
 
-    @njit
+    @njit  # type: ignore[untyped-decorator]
     def derivatives(phase: float, y: Any, cell: Any) -> Any:
         return np.array([rate(phase, cell), y[0]])
 

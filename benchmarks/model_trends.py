@@ -78,7 +78,7 @@ def experiments() -> str:
                     f"as {SlidingMode(found.sliding_mode.item()).name.lower().replace('_', '–')}"
                 )
             if found.validity & Validity.NOT_RECOUPLED:
-                about.append("does not re-stick")
+                about.append("still slides at the next pulse")
             value = f"{found.permanent_displacement.item() * 1000:.0f}"
             row.append(f"{value} ({', '.join(about)})" if about else value)
         rows.append(row)

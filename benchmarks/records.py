@@ -47,9 +47,9 @@ def motions() -> dict[str, Any]:
 
 def refined(values: np.ndarray, parts: int) -> np.ndarray:
     """The straight lines between samples, sampled `parts` times as finely."""
-    return np.interp(
-        np.arange((values.size - 1) * parts + 1) / parts, np.arange(values.size), values
-    )
+    places = np.arange((values.size - 1) * parts + 1) / parts
+    samples: np.ndarray = np.interp(places, np.arange(values.size), values)
+    return samples
 
 
 def pyslammer_displacement(motion: Any, parts: int, ky: float = KY, factor: float = 1.0) -> float:
@@ -64,7 +64,7 @@ def exact_displacement(motion: Any, g: float, ky: float = KY, factor: float = 1.
     """Newmark's block by slipsweep, m."""
     record = Record.sampled(factor * motion.accel * g, motion.dt)
     return float(
-        sweep(yield_coefficient=ky, model=Newmark(g), excitation=record).permanent_displacement
+        sweep(yield_coefficient=ky, model=Newmark(g=g), excitation=record).permanent_displacement
     )
 
 
@@ -255,7 +255,7 @@ def main(given: argparse.Namespace) -> Path:
         "over or not.\n\n"
         f"{times}"
     )
-    return page
+    return Path(page)
 
 
 if __name__ == "__main__":

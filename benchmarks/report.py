@@ -38,7 +38,8 @@ WAVES: dict[str, Waveform] = {
 
 def displacement(**options: Any) -> xr.DataArray:
     """`slipsweep.sweep` of nothing but the permanent displacement."""
-    return slipsweep.sweep(**options, variables=["permanent_displacement"]).permanent_displacement
+    result = slipsweep.sweep(**options, variables=["permanent_displacement"])
+    return result["permanent_displacement"]
 
 
 def size_of(grid: Mapping[str, Any]) -> int:
@@ -80,8 +81,9 @@ def cycle_solver(tiny: bool) -> str:
     )
     return (
         "## The cycle solver\n\n"
-        + table(["cells", "number", "ns a cell and core", "median error", "worst error"], rows)
-        + f"\nTen cycles, displacement only; median over nine rounds of the best of three calls. "
+        + table(["cells", "number", "core time per cell, ns", "median error", "worst error"], rows)
+        + "\nTen cycles, displacement only. Core time is the elapsed time times the number of cores; "
+        "median over nine rounds of the best of three calls. "
         f"Of the design chart {shares.replace('_', '–')}. Errors are relative, "
         f"against 30 digits, over {sample.SIZE} random cells a regime (benchmarks/data/sample.csv).\n"
     )
@@ -149,7 +151,7 @@ def waveforms(tiny: bool) -> str:
     ]
     return (
         "## Waveforms\n\n"
-        + table(["waveform", "ns a cell and core", "over the sine's"], rows)
+        + table(["waveform", "core time per cell, ns", "over the sine's"], rows)
         + f"\nThe cycle solver, displacement only, ten cycles; {size_of(grid):,} cells of a design chart.\n"
     )
 

@@ -64,9 +64,8 @@ class Group:
             "solver": solver,
             "variables": ["permanent_displacement"],
         }
-        return slipsweep.sweep(
-            **cells, **options, excitation=slipsweep.Sine(1)
-        ).permanent_displacement.to_numpy()
+        result = slipsweep.sweep(**cells, **options, excitation=slipsweep.Sine(1))
+        return result["permanent_displacement"].to_numpy()
 
 
 def read() -> dict[str, list[Group]]:

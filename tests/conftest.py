@@ -3,6 +3,7 @@
 import gc
 import os
 import signal
+import sys
 from collections.abc import Iterator
 
 import pytest
@@ -14,6 +15,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # a collection of garbage goes through all that numba and Matplotlib have made: a twentieth of the
 # suite's time
 gc.set_threshold(100_000, 20, 20)
+
+# faults are made with what Linux has: forked processes, /proc, limits of file sizes
+collect_ignore = [] if sys.platform == "linux" else ["files/test_faults.py"]
 
 # each process that a test starts would compile all sources of the program anew, which is a fifth of
 # its time

@@ -14,8 +14,10 @@ PACKAGE = Path(slipsweep.__file__).parent
 ORDER = (
     "_version",
     "errors",
+    "locks",
     "jit",
     "model",
+    "published",
     "motion",
     "kernels",
     "grid",
@@ -74,6 +76,12 @@ def test_no_import_runs_back_up() -> None:
         if other in FACE or ORDER.index(folder(other)) > ORDER.index(folder(name))
     }
     assert back == set()
+
+
+def test_the_stepping_kernel_shares_no_solver_with_the_exact_ones() -> None:
+    """It is to check them: of the kernels it takes what a cell is, Eqs. 7-11 and the flags."""
+    shared = {name for name in ARROWS["slipsweep.kernels.step"] if folder(name) == "kernels"}
+    assert shared == {"slipsweep.kernels.block"}
 
 
 def test_no_two_modules_import_each_other() -> None:

@@ -1,5 +1,6 @@
 """What is built to be installed has what it needs, and nothing that is not the project's."""
 
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -30,6 +31,47 @@ def test_the_citation_is_of_this_version_and_of_the_paper() -> None:
         f"{author['given-names']} {author['family-names']}" in REFERENCE
         for author in paper["authors"]
     )
+
+
+#: A project that is ready for release, file by file.
+READY = {
+    "src/slipsweep/_version.py": '__version__ = "1.2.0"\n',
+    "CITATION.cff": "version: 1.2.0\ndate-released: 2027-03-01\n",
+    "CHANGELOG.md": "## Unreleased\n\n## 1.2.0 (2027-03-01)\n",
+    "SECURITY.md": "Write to somebody.\n",
+}
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "refusal"),
+    [
+        ("SECURITY.md", READY["SECURITY.md"], ""),
+        ("SECURITY.md", "Write to\nPLACEHOLDER-CONTACT.\n", "SECURITY.md:2: PLACEHOLDER-CONTACT"),
+        ("src/slipsweep/_version.py", '__version__ = "1.2.1"\n', "_version.py: is not of v1.2.0"),
+        ("CITATION.cff", "version: 1.1.0\ndate-released: 2027-03-01\n", "version is not of v1.2.0"),
+        ("CITATION.cff", "version: 1.2.0\n", "date-released is missing"),
+        ("CHANGELOG.md", "## Unreleased\n", "has no heading ## 1.2.0"),
+        (
+            "CHANGELOG.md",
+            "## 1.2.0 (2027-02-01)\n",
+            "dated 2027-02-01, and CITATION.cff 2027-03-01",
+        ),
+    ],
+)
+def test_a_release_that_is_not_ready_is_refused(
+    tmp_path: Path, file: str, text: str, refusal: str
+) -> None:
+    for name, content in (READY | {file: text}).items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(content)
+    (tmp_path / ".ci").mkdir()
+    check = shutil.copy(ROOT / ".ci" / "release-check", tmp_path / ".ci")
+    for command in (["git", "init", "--quiet"], ["git", "add", "."]):
+        subprocess.run(command, cwd=tmp_path, check=True)
+    done = subprocess.run([sys.executable, check, "v1.2.0"], capture_output=True, text=True)
+    assert done.returncode == bool(refusal), done.stderr
+    assert refusal in done.stderr
+    assert done.stderr.count("\n") == bool(refusal)
 
 
 @pytest.mark.slow

@@ -24,6 +24,7 @@ from slipsweep.model.options import MODELS, SOLVERS
 from slipsweep.model.variables import DIMENSION_ORDER, Validity
 from slipsweep.motion.reading import Reading
 from slipsweep.motion.waveforms import WAVEFORMS
+from slipsweep.published import EQUATIONS
 from tests.support.commands import command, working_folder
 
 ROOT = Path(__file__).parents[1]
@@ -35,7 +36,9 @@ PAGES = sorted(
 #: Pages whose blocks are of files, kernels and machines that only a reader has.
 NOT_RUN = (
     "CONTRIBUTING.md",
+    "SECURITY.md",
     "docs/records.md",
+    "docs/releasing.md",
     "docs/scaling.md",
     "docs/suites.md",
     "docs/waveforms.md",
@@ -367,6 +370,12 @@ def test_keys_are_those_of_the_schema(heading: str) -> None:
             assert stated == "–", name
         elif default is not None:
             assert stated.replace('"', "'") == repr(default), name
+
+
+def test_published_equations_are_those_of_the_program() -> None:
+    table = rows(section("docs/published.md", "## The equations"))[1:]
+    stated = [(name.strip("`"), deviation, limits) for name, _, deviation, limits in table]
+    assert stated == [(one.name, one.deviation, one.range_text) for one in EQUATIONS.values()]
 
 
 def test_the_table_of_contents_of_a_file_names_every_dimension() -> None:

@@ -1,3 +1,4 @@
+from . import published as published
 from ._version import __version__ as __version__
 from .errors import InputError as InputError
 from .errors import RunError as RunError
@@ -27,5 +28,6 @@ from .studies.hazard import HazardCurve as HazardCurve
 from .studies.hazard import displacement_hazard as displacement_hazard
 from .studies.history import simulate as simulate
 from .studies.limits import limit_amplitude as limit_amplitude
+from .studies.published_statistics import published_statistics as published_statistics
 from .studies.suite_statistics import suite_statistics as suite_statistics
 from .studies.uncertainty import sample as sample

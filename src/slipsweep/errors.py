@@ -1,6 +1,7 @@
-"""Errors of two kinds, bad input and failed runs, and what to say to a name that is not known."""
+"""Errors of two kinds, bad input and failed runs, a warning, and what to say of what is missing."""
 
 import difflib
+import importlib.util
 from collections.abc import Sequence
 
 
@@ -39,6 +40,23 @@ class RunError(RuntimeError):
     Traceback (most recent call last):
     slipsweep.errors.RunError: no annual rate: the model gives no value under any motion at two amplitudes or more
     """
+
+
+class RunWarning(UserWarning):
+    """A circumstance outside the input that costs time or safety, and no result (disk, locks)."""
+
+
+def check_extra(what: str, extra: str, *packages: str, otherwise: str = "") -> None:
+    """Refuse what needs packages of an extra that are not installed (InputError).
+
+    `otherwise` says what can be done instead.
+    """
+    missing = [name for name in packages if importlib.util.find_spec(name) is None]
+    if missing:
+        raise InputError(
+            f"{what} needs {' and '.join(missing)}; "
+            f"in the cloned repository: pip install '.[{extra}]'{otherwise}"
+        )
 
 
 def did_you_mean(word: str, known: Sequence[str]) -> str:

@@ -29,7 +29,9 @@ def test_friction_writes_what_it_finds(capsys: pytest.CaptureFixture[str]) -> No
     with xr.open_dataset("friction.nc") as found:
         assert found.sizes["slide"] == 8
         assert found.friction_ratio.dims == ("instant",)
-    slipsweep.open_result("friction.nc").slipsweep.chart("friction").savefig("again.png")
+    figure = slipsweep.open_result("friction.nc").slipsweep.chart("friction")
+    figure.savefig("again.png", dpi=150)
+    assert Path("again.png").read_bytes() == Path("friction.png").read_bytes()
 
 
 def test_friction_takes_offsets_off_by_the_rest(capsys: pytest.CaptureFixture[str]) -> None:
@@ -58,6 +60,33 @@ def test_calibrate_writes_what_it_finds(capsys: pytest.CaptureFixture[str]) -> N
     assert Path("model.toml").read_text() in printed
     assert "[uncertainty.decay_rate]" in Path("model.toml").read_text()
     assert Path("calibration.svg").read_text().count("misfit") == 3
+    check_figure(slipsweep.open_result("calibration.nc").load())
+
+
+def check_figure(found: xr.Dataset) -> None:
+    """Each panel has what was measured and what was computed, in the unit of its label."""
+    figure = found.slipsweep.chart()
+    channels = {
+        "ground_acceleration": ("acceleration of\nthe table (m/s²)", 1.0, "smooth"),
+        "block_acceleration": ("acceleration of\nthe block (m/s²)", 1.0, "computed"),
+        "relative_velocity": ("relative\nvelocity (m/s)", 1.0, "computed"),
+        "relative_displacement": ("relative\ndisplacement (mm)", 1000.0, "computed"),
+    }
+    for axes, (channel, (label, factor, computed)) in zip(
+        figure.axes[:4], channels.items(), strict=True
+    ):
+        assert axes.get_ylabel() == label
+        lines = {str(line.get_label()): line for line in axes.lines}
+        for name, kind in (("measured", "measured"), (computed, "computed")):
+            expected = factor * found[f"{kind}_{channel}"]
+            np.testing.assert_array_equal(lines[name].get_xdata(), found.time)
+            np.testing.assert_allclose(lines[name].get_ydata(), expected, rtol=1e-14)
+    friction = {str(line.get_label()): line.get_ydata() for line in figure.axes[4].lines}
+    np.testing.assert_array_equal(friction["by statics"], found.free_body_friction)
+    np.testing.assert_array_equal(friction["μ(t) by Eq. 1"], found.friction_coefficient)
+    low, high = found.yield_acceleration_interval.values
+    text = f"Üy = {found.yield_acceleration.item():.4g} m/s² ({low:.3g} to {high:.3g}), λ = "
+    assert text in figure.get_supxlabel()
 
 
 def test_constant_friction_is_the_first_line(capsys: pytest.CaptureFixture[str]) -> None:
@@ -77,13 +106,20 @@ def test_constant_friction_is_the_first_line(capsys: pytest.CaptureFixture[str])
     assert 'friction = "newmark"' in Path("model.toml").read_text()
 
 
-def test_several_tests(capsys: pytest.CaptureFixture[str]) -> None:
+def test_two_tests_are_calibrated_together(capsys: pytest.CaptureFixture[str]) -> None:
     Path("short.csv").write_text("".join(Path(TEST).read_text().splitlines(keepends=True)[2::4]))
     assert cli.main(["calibrate", "short.csv", "short.csv", *BLOCK, "-o", "both.nc"]) == 0
     assert capsys.readouterr().out.count("cycle  starts, s") == 2
     with xr.open_dataset("both.nc") as found:
         assert found.sizes["test"] == 2
         assert found.misfit_relative_velocity.dims == ("test",)
+        figure = found.load().slipsweep.chart()
+    titles = [axes.get_title(loc="left") for axes in figure.axes]
+    for number in range(2):  # a column for each test
+        test = found.isel(test=number)
+        misfit = test.misfit_relative_velocity.item()
+        share = test.relative_misfit_relative_velocity.item()
+        assert titles[4 + number] == f"misfit {misfit:.2g} m/s ({share:.1%})"
 
 
 @pytest.mark.parametrize(
@@ -103,7 +139,7 @@ def test_several_tests(capsys: pytest.CaptureFixture[str]) -> None:
         (("calibrate", TEST, "--theta", "95", "--mu-s", "0.38"), "theta = 95"),
     ],
 )
-def test_what_cannot_be(
+def test_commands_on_tests_that_are_refused(
     arguments: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert cli.main(list(arguments)) == 2

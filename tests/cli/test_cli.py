@@ -2,9 +2,9 @@
 
 import contextlib
 import csv
+import io
 import os
 import re
-import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -15,6 +15,7 @@ import pytest
 import xarray as xr
 
 from slipsweep import cli
+from slipsweep.cli.options import app
 from tests.support.commands import SLIPSWEEP, command, run_command, slipsweep
 
 SWEEPS = Path(__file__).parents[2] / "sweeps"
@@ -39,9 +40,7 @@ SIMULATE = (
 )
 
 #: All commands.
-NAMES = sorted(
-    one.callback.__name__ for one in cli.app.registered_commands if one.callback is not None
-)
+NAMES = sorted(one.callback.__name__ for one in app.registered_commands if one.callback is not None)
 
 
 def assert_fails(done: "subprocess.CompletedProcess[str]", status: int, *messages: str) -> None:
@@ -187,14 +186,22 @@ def test_bad_commands_are_refused_by_typer(
 
 
 def limited() -> None:
+    import resource  # not on Windows
+
     resource.setrlimit(resource.RLIMIT_FSIZE, (2_000, 2_000))
 
 
 @pytest.mark.skipif(os.name != "posix", reason="limits the size of files the POSIX way")
 @pytest.mark.parametrize(
     "line",
-    ["run small.toml -o a.nc", "chart small.nc -k contours -o a.pdf", "export small.nc -o a.xlsx"],
+    [
+        "run small.toml -o a.nc",
+        "chart small.nc -k contours -o a.pdf",
+        "chart small.nc -k modes -k dimensionless -o a.pdf",
+        "export small.nc -o a.xlsx",
+    ],
 )
+@pytest.mark.usefixtures("without_layout")
 def test_a_full_disk_leaves_one_line_that_names_the_file(small: Path, line: str) -> None:
     *arguments, name = line.split()
     assert command(small, "run", "small.toml").returncode == 0
@@ -230,6 +237,24 @@ def test_settings_of_other_programs_do_no_harm(small: Path) -> None:
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert (small / "limit.png").exists()
+
+
+def test_letters_that_a_terminal_cannot_print_are_spelled(small: Path) -> None:
+    command(small, "run", "small.toml")
+    printed = []
+    for encoding in ("ascii", "latin-1", "utf-8"):
+        written = io.BytesIO()
+        stream = io.TextIOWrapper(written, encoding, write_through=True)
+        with contextlib.redirect_stdout(stream), contextlib.chdir(small):
+            assert cli.main(["info", "small.nc"]) == 0
+        printed.append(written.getvalue().decode(encoding))
+    inputs = [re.findall("friction_inputs: (.*)\n", text)[0] for text in printed]
+    assert inputs == [
+        "Uy by Coulomb, lambda by Eq. 6, Deltamu by Eqs. 10-11: estimated",
+        "Üy by Coulomb, lambda by Eq. 6, Deltamu by Eqs. 10-11: estimated",
+        "Üy by Coulomb, λ by Eq. 6, Δμ by Eqs. 10–11: estimated",
+    ]
+    assert "\\" not in printed[0]
 
 
 #: A process whose user has no account.
@@ -273,7 +298,7 @@ def test_control_sequences_of_a_file_do_not_reach_the_terminal(small: Path) -> N
 # ---------------------------------------------------------------------------- info, simulate
 
 
-def test_info(small: Path) -> None:
+def test_info_prints_axes_variables_and_shares(small: Path) -> None:
     command(small, "run", "small.toml")
     done = command(small, "info", "small.nc")
     assert done.returncode == 0

@@ -1,13 +1,18 @@
 """Outputs are complete or absent, and never what a command reads."""
 
+import errno
 import os
+import subprocess
+import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from slipsweep.cli import main
 from slipsweep.errors import InputError, RunError
-from slipsweep.files import outputs
+from slipsweep.files import outputs, running, storing
+from tests.support.no_locks import refusing_locks
 
 SWEEP = """
 [axes]
@@ -61,6 +66,7 @@ def test_what_exists_is_kept(
         assert f"/proc/{path}" in refused(capfd, *command.split(), f"/proc/{path}")
 
 
+@pytest.mark.skipif(os.name != "posix", reason="links need rights that users of Windows lack")
 def test_no_command_writes_what_it_reads(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -74,6 +80,100 @@ def test_no_command_writes_what_it_reads(
     assert "is given twice" in refused(
         capfd, "chart", "a.nc", "--kind", "contours", "-o", "b.png", "-o", "b.png"
     )
+
+
+#: Commands one after the other, in a process of their own.
+SEVERAL = """
+import sys
+from slipsweep.cli import main
+print(*[main(line.split()) for line in sys.argv[1:]])
+"""
+
+
+def test_where_the_file_system_has_no_locks_the_setting_is_named_that_goes_without(
+    folder: Path,
+) -> None:
+    def ended(lines: list[str], **setting: str) -> tuple[str, list[str]]:
+        done = subprocess.run(
+            [sys.executable, "-c", SEVERAL, *lines],
+            cwd=folder,
+            env=os.environ | setting,
+            capture_output=True,
+            text=True,
+            timeout=300,
+            check=False,
+            preexec_fn=refusing_locks(errno.ENOLCK),
+        )
+        return done.stdout, done.stderr.splitlines()
+
+    lines = ["run a.toml -o n.nc -q", "info a.nc", "run a.toml -o n.zarr -q"]
+    status, (written, read, store) = ended(lines)
+    assert status == "1 2 0\n"
+    named = "the file system has no locks; set HDF5_USE_FILE_LOCKING=FALSE to go without"
+    assert written == f"slipsweep: error: n.nc: writing failed: Permission denied: {named}"
+    assert read == f"slipsweep: error: a.nc: cannot be read: {named}"
+    unseen = "the file system has no locks: a second run at this output would not be seen"
+    assert store == f"slipsweep: warning: n.zarr: {unseen}"
+    assert not (folder / "n.nc").exists()
+    lines = ["run a.toml -o n.nc -q", "export n.nc -o n.csv -q"]
+    assert ended(lines, HDF5_USE_FILE_LOCKING="FALSE") == ("0 0\n", [])
+
+
+@pytest.mark.parametrize("output", ["a.nc", "a.zarr", "a.csv"])
+def test_overwrite_through_a_link_replaces_what_it_points_to(
+    folder: Path, tmp_path: Path, output: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(running, "CHUNK_CELLS", 2)  # in chunks
+    Path("elsewhere").mkdir()
+    link = Path(output)
+    target = Path("elsewhere", f"real{link.suffix}")
+    command = ["export", str(folder / "a.nc")] if link.suffix == ".csv" else []
+    command = [*(command or ["run", str(folder / "a.toml")]), "-q", "-o"]
+    assert main([*command, str(target)]) == 0
+    before = target.stat()
+    link.symlink_to(target)
+    assert main([*command, output]) == 2  # it exists
+    assert main([*command, output, "--overwrite"]) == 0
+    assert link.readlink() == target
+    assert target.stat().st_ino != before.st_ino
+    assert {path.name for path in tmp_path.iterdir()} == {"elsewhere", output}
+    assert [path.name for path in Path("elsewhere").iterdir()] == [target.name]
+    link.unlink()
+    link.symlink_to("nowhere/real.nc")
+    assert main([*command, output, "--overwrite"]) == 2
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_an_output_without_a_name_is_refused(
+    folder: Path, command: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(folder)
+    before = {path.name for path in folder.iterdir()}
+    assert "--output: must be the name of a file" in refused(capfd, *command.split(), "")
+    assert {path.name for path in folder.iterdir()} == before
+
+
+def test_a_result_that_is_not_finished_says_so(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(running, "CHUNK_CELLS", 2)
+    write = storing.Chunks.write
+
+    def interrupted(chunks: storing.Chunks, number: int, *results: Any) -> None:
+        if number == 2:
+            raise KeyboardInterrupt
+        write(chunks, number, *results)
+
+    monkeypatch.setattr(storing.Chunks, "write", interrupted)
+    assert main(["run", str(folder / "a.toml"), "-o", "b.nc", "-q"]) == 130
+    for name in ("b.nc", "b.nc.part"):
+        text = refused(capfd, "info", name)
+        assert f"{name}: is not finished: 2 of its chunks are in b.nc.part" in text
+        assert "run its sweep again with --resume" in text
+    Path("b.nc").write_bytes((folder / "a.nc").read_bytes())
+    assert main(["info", "b.nc"]) == 0  # an earlier one is there
 
 
 def test_a_folder_that_is_no_store_is_kept(folder: Path, tmp_path: Path) -> None:
@@ -95,17 +195,21 @@ def write(
             raise failure
 
 
+@pytest.mark.skipif(not os.path.isdir("/proc"), reason="takes the file system that has no size")
+def test_a_file_system_without_a_size_is_not_said_to_be_full() -> None:
+    with (
+        pytest.raises(RunError, match=r"failed: Not a directory$"),
+        outputs.writing("/proc/self/a.nc"),
+    ):
+        raise OSError(20, "Not a directory")
+
+
 def test_complete_or_absent(tmp_path: Path) -> None:
     path = tmp_path / "a.txt"
     with pytest.raises(
         RunError, match=r"a\.txt: writing failed: No space left on device \(.* free on the disk\)"
     ):
         write(path, False, OSError(28, "No space left on device"))
-    with (
-        pytest.raises(RunError, match=r"failed: Not a directory$"),
-        outputs.writing("/proc/self/a.nc"),
-    ):  # has no size
-        raise OSError(20, "Not a directory")
     assert not list(tmp_path.iterdir())
     with pytest.raises(RunError, match="was made by another process during the run"):
         write(path, False, theirs="theirs")

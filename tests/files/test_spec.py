@@ -47,7 +47,7 @@ def test_axes_become_arrays_in_the_parameters_own_units() -> None:
     np.testing.assert_allclose(arguments["frequency"], [0.1, 1, 10])
 
 
-def test_defaults() -> None:
+def test_a_sweep_file_has_pythons_defaults() -> None:
     sweep = spec.parse(GOOD, "a.toml")
     assert sweep.excitation == Sine(cycles=10, ramp_in=0.0, ramp_out=0.0)
     assert sweep.model == Mendez(rise="monotone", recoupling="eq12", g=9.81)
@@ -126,7 +126,9 @@ def test_the_plan_of_a_block() -> None:
         ("frequency", "rad/s", 1 / (2 * math.pi)),
     ],
 )
-def test_units(name: str, units: str, factor: float) -> None:
+def test_axes_are_converted_to_the_parameters_own_units(
+    name: str, units: str, factor: float
+) -> None:
     text = axis(name, f'values = [0.25, 0.5], units = "{units}"')
     given = spec.parse(text, "a.toml").inputs.given
     np.testing.assert_allclose(given[name], np.array([0.25, 0.5]) * factor, rtol=1e-14)
@@ -182,6 +184,7 @@ BAD = {
         "variables = 'validty': must be one of",
     ),
     "number for a path": (GOOD + "[output]\npath = 3", "output.path = 3: must be a text"),
+    "empty path": (GOOD + "[output]\npath = ''", 'output.path = "": must be the name of a file'),
     # axes
     "empty": (
         axis("theta", "values = []"),

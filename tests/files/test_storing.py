@@ -3,11 +3,13 @@
 import math
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 
@@ -17,6 +19,8 @@ from slipsweep.files import running, spec, storing
 from slipsweep.files.jobs import Job, limit_job, sweep_job
 from slipsweep.files.opening import read_result
 from slipsweep.grid.tally import tally_of
+from tests.support.commands import command
+from tests.support.made_up_records import write_motion
 
 GRID = """
 [axes]
@@ -47,12 +51,6 @@ axes.frequency.values = [1, 2]
     "samples": WAVE
     + "[uncertainty]\nsamples = 16\ndecay_rate = {distribution = 'lognorm', s = 0.3, scale = 2.0}\n",
 }
-
-
-def write_motion(path: Path, seed: int, count: int, interval: float) -> None:
-    values = 0.3 * np.random.default_rng(seed).normal(size=count) * np.hanning(count)
-    rows = (f"{at * interval:.6g},{value:.6g}\n" for at, value in enumerate(values))
-    path.write_text("time,acceleration\n" + "".join(rows))
 
 
 @pytest.fixture
@@ -187,6 +185,38 @@ def test_a_run_goes_on_with_its_own_chunks_only(
     assert read_result(path).attrs["model"] == "newmark"
 
 
+def test_a_run_goes_on_with_other_memory_if_its_chunks_fit(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Chunks keep the size that the run was begun with; less memory than they take is refused."""
+    monkeypatch.setattr(running, "_BASE_MEMORY", 0)
+    cell = 2 * (8 + 8 + 1 + 2) + 8  # two copies of the default results, and 8 bytes
+    (folder / "sweep.toml").write_text(WAVE.replace("num = 4", "num = 400"))
+    path = folder / "a.nc"
+    mark = storing._mark
+
+    def failing(place: str, number: int) -> None:
+        if number == 2:
+            raise OSError(28, "No space left on device")
+        mark(place, number)
+
+    monkeypatch.setattr(storing, "_mark", failing)
+    with pytest.raises(RunError, match="No space"):
+        stored(job_of(folder, "sweep"), path, memory=2400 * cell)
+    marked: list[int] = []
+    monkeypatch.setattr(storing, "_mark", lambda place, number: marked.append(number))
+    with pytest.raises(
+        InputError, match="larger chunks than fit into the memory asked for; give more --memory"
+    ):
+        stored(job_of(folder, "sweep"), path, resume=True, memory=1000 * cell)
+    assert not stored(job_of(folder, "sweep"), path, resume=True, memory=7200 * cell).found
+    assert marked == [2]
+    stored(job_of(folder, "sweep"), folder / "whole.nc")
+    xr.testing.assert_identical(
+        without_time(read_result(path)), without_time(read_result(folder / "whole.nc"))
+    )
+
+
 def test_another_motion_is_another_run(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     stored(job_of(folder, "suite"), folder / "a.nc")
     (folder / "motions" / "m2.csv").rename(folder / "motions" / "m3.csv")
@@ -297,7 +327,7 @@ def packed(table: xr.Dataset) -> xr.Dataset:
 
 
 #: What other programs do to a file, and leave its meaning.
-EDITS = {
+EDITS: dict[str, Callable[[xr.Dataset], xr.Dataset]] = {
     "packed": packed,
     "transposed": lambda table: table.transpose(*reversed(table.permanent_displacement.dims)),
     "codes as numbers": lambda table: table.assign(sliding_mode=table.sliding_mode.astype(float)),
@@ -322,6 +352,97 @@ def test_what_other_programs_have_rewritten(folder: Path, edit: str) -> None:
     np.testing.assert_array_equal(
         again.sliding_mode.transpose(*whole.sliding_mode.dims), whole.sliding_mode
     )
+
+
+def outer(table: xr.Dataset) -> xr.Dataset:
+    """Cells that one of two results has, joined with those of both."""
+    other = table.isel(mu_s=[0]).assign_coords(theta=table.theta + 1.0)
+    return xr.concat([table, other], "theta", join="outer")
+
+
+#: What makes another grid of a result, and what is said of it.
+OTHER_GRIDS: dict[str, tuple[Callable[[xr.Dataset], xr.Dataset], str]] = {
+    "joined": (
+        lambda table: xr.concat([table, table.assign_coords(theta=table.theta + 20)], "theta"),
+        "theta: 6 values, 0 to 30 degree, where the sweep that it stores has 3 values, 0 to 10 degree",
+    ),
+    "joined along another axis": (
+        lambda table: xr.concat([table, table], xr.IndexVariable("cycles", [5, 10])),
+        "cycles: is no dimension of the sweep that it stores",
+    ),
+    "joined along a parameter": (
+        lambda table: xr.concat([table, table], xr.IndexVariable("yield_acceleration", [1.0, 2.0])),
+        "yield_acceleration: is no dimension of the sweep that it stores",
+    ),
+    "outer": (outer, "theta: 6 values, 0 to 11 degree, where"),
+    "cut": (
+        lambda table: table.isel(mu_s=0),
+        "mu_s: 0.3, where the sweep that it stores has 2 values, 0.3 to 0.5",
+    ),
+    "shifted": (
+        lambda table: table.assign_coords(frequency=table.frequency * 1.001),
+        "frequency: 3 values, 0.5005 to 2.002 Hz, where",
+    ),
+    "mean": (
+        lambda table: table.mean("theta", keep_attrs=True),
+        "theta: no values, where the sweep that it stores has 3 values, 0 to 10",
+    ),
+}
+
+
+@pytest.mark.parametrize("change", OTHER_GRIDS)
+def test_a_result_with_another_grid_than_its_sweep_is_not_solved_again(
+    folder: Path, change: str
+) -> None:
+    make, message = OTHER_GRIDS[change]
+    job = job_of(folder, "sweep")
+    stored(job, folder / "a.nc")
+    make(slipsweep.open_result(folder / "a.nc").load()).to_netcdf(folder / "b.nc")
+    with pytest.raises(InputError, match=rf"b\.nc: {message}"):
+        spec.load(folder / "b.nc")  # which run and limit do
+    with pytest.raises(InputError, match=rf"b\.nc: {message}"):
+        stored(job, folder / "b.nc", resume=True)
+
+
+def test_a_suite_with_other_motions_is_not_solved_again(folder: Path) -> None:
+    stored(job_of(folder, "suite"), folder / "a.nc")
+    whole = slipsweep.open_result(folder / "a.nc").load()
+    whole.isel(motion=[0]).to_netcdf(folder / "b.nc")
+    with pytest.raises(InputError, match=r"b\.nc: motion: m1, where .* has m1, m2: "):
+        spec.load(folder / "b.nc")
+
+
+@pytest.mark.parametrize("change", ["masked", "outer", "filled"])
+def test_cells_that_have_lost_their_flags_are_not_without_flags(folder: Path, change: str) -> None:
+    stored(job_of(folder, "sweep"), folder / "a.nc")
+    whole = slipsweep.open_result(folder / "a.nc").load()
+    if change == "outer":
+        table = outer(whole)
+        lost = table.permanent_displacement.isnull() & (table.theta % 5 == 1)
+    else:
+        lost = whole.theta == 5
+        table = whole.where(~lost)
+        if change == "filled":
+            table["validity"].encoding |= {"dtype": "int16", "_FillValue": -9}
+    table.to_netcdf(folder / "b.nc")
+    opened = slipsweep.open_result(folder / "b.nc")
+    lost = lost.broadcast_like(opened.validity)
+    xr.testing.assert_equal(opened.validity.isnull().compute(), lost)
+    assert (opened.sliding_mode.where(lost, -1) == -1).all()
+    with pytest.raises(InputError, match="whole numbers, of which none is missing"):
+        slipsweep.flags(opened)
+    tally = tally_of(opened)
+    assert tally.unflagged == int(lost.sum()) > 0
+    assert tally.flags is not None
+    for flag, count in tally.flags.items():
+        assert count == int(((table.validity.fillna(0).astype(int) & int(flag)) != 0).sum())
+    done = command(folder, "export", "b.nc", "-o", "b.csv", "--words")
+    assert done.returncode == 0, done.stderr
+    words = pd.read_csv(folder / "b.csv", keep_default_na=False)["validity"].to_numpy()
+    named = table.validity.transpose(*opened.validity.dims).values.ravel()
+    assert [bool(word) for word in words] == (np.nan_to_num(named) != 0).tolist()
+    shown = f"  not known              {tally.unflagged / tally.cells:9.2%}  another program has"
+    assert shown in command(folder, "info", "b.nc").stdout
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,7 @@ def test_copies_are_the_result_again(result: xr.Dataset) -> None:
     xr.testing.assert_equal(pickle.loads(pickle.dumps(lazy)).compute(), result)
 
 
-def test_a_row_a_cell(result: xr.Dataset) -> None:
+def test_a_dataframe_has_a_row_for_each_cell(result: xr.Dataset) -> None:
     rows = result.to_dataframe()
     assert list(rows.index.names) == ["theta", "mu_s", "amplitude"]
     expected = result.permanent_displacement.sel(theta=5.0, mu_s=0.4, amplitude=9.0)

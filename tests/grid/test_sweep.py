@@ -1,9 +1,12 @@
 """`sweep` and its siblings as functions: what goes in, what comes out, what is refused, what it costs."""
 
 import math
+import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +16,7 @@ import xarray as xr
 import slipsweep
 from slipsweep._version import __version__
 from slipsweep.errors import InputError
-from slipsweep.grid import engine
+from slipsweep.grid import solvers
 from slipsweep.model.variables import (
     DEFAULT_RESULTS,
     FRICTION_PARAMETERS,
@@ -38,7 +41,7 @@ GOOD: dict[str, Any] = {"theta": 5.0, "mu_s": 0.38, "amplitude": 3.0, "frequency
 def cells_solved(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Cells of each call of a motion kernel."""
     solved: list[int] = []
-    solver_of = engine.solvers.solver_of
+    solver_of = solvers.solver_of
 
     def counting(*arguments: Any) -> Any:
         solver = solver_of(*arguments)
@@ -49,7 +52,7 @@ def cells_solved(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
         return solver._replace(solve=call)
 
-    monkeypatch.setattr(engine.solvers, "solver_of", counting)
+    monkeypatch.setattr(solvers, "solver_of", counting)
     return solved
 
 
@@ -190,6 +193,13 @@ def test_structure_frequency_sets_a_flag_and_no_more() -> None:
     )
 
 
+def test_a_structure_is_flexible_from_a_fifth_to_thirteen_tenths_of_its_frequency() -> None:
+    ratio = np.array([0.199, 0.2, 0.7, 1.3, 1.301])
+    result = slipsweep.sweep(**{**GOOD, "frequency": 2.0 * ratio}, structure_frequency=2.0)
+    flexible = (result.validity & int(Validity.FLEXIBLE_BLOCK)) != 0
+    np.testing.assert_array_equal(flexible, [False, True, True, True, False])
+
+
 # ------------------------------------------------------------------------ what is computed
 
 
@@ -220,11 +230,75 @@ def test_what_is_given_is_a_coordinate_and_no_result() -> None:
     assert result.delta_mu.item() == 0.1
 
 
+@pytest.mark.parametrize("shaking", ["wave", "record"])
+def test_newmarks_displacement_beside_ours_is_that_of_newmarks_block(shaking: str) -> None:
+    """With the same yield acceleration, at every frequency or time scale."""
+    given: dict[str, Any] = {"theta": 5.0, "mu_s": [0.3, 0.4], "yield_acceleration": 1.0}
+    if shaking == "wave":
+        given |= {"amplitude": [2.0, 5.0], "frequency": [0.5, 1.0, 3.0]}
+    else:
+        values = 4.0 * np.sin(np.arange(200) * 0.1)
+        record = slipsweep.Record.sampled(values, 0.02)
+        given |= {"excitation": record, "time_scale": [0.5, 1.0, 3.0], "scale": [1.0, 2.0]}
+    names = ["permanent_displacement", "newmark_displacement"]
+    found = slipsweep.sweep(**given, variables=names)
+    expected = slipsweep.sweep(**given, model="newmark").permanent_displacement
+    np.testing.assert_allclose(found.newmark_displacement, expected, rtol=1e-13)
+    clock = "frequency" if shaking == "wave" else "time_scale"
+    assert (expected.diff(clock) != 0.0).all()
+    assert (found.permanent_displacement != expected).any()
+
+
+def test_a_yield_coefficient_is_of_the_models_own_gravity() -> None:
+    moon = slipsweep.Newmark(g=1.62)
+    shaking: dict[str, Any] = {"amplitude": [0.3, 1.0], "frequency": 1.0, "model": moon}
+    found = slipsweep.sweep(yield_coefficient=[0.05, 0.1], **shaking)
+    expected = slipsweep.sweep(0.0, 0.5, yield_acceleration=[0.081, 0.162], **shaking)
+    np.testing.assert_allclose(
+        found.permanent_displacement.transpose("yield_coefficient", "amplitude"),
+        expected.permanent_displacement.transpose("yield_acceleration", "amplitude"),
+        rtol=1e-13,
+    )
+
+
 def test_nothing_unasked_is_computed(cells_solved: list[int]) -> None:
     result = slipsweep.sweep(**AXES, variables=FRICTION_PARAMETERS)
     assert tuple(result.data_vars) == tuple(name for name in RESULTS if name in FRICTION_PARAMETERS)
     assert not cells_solved
     assert slipsweep.sweep(**AXES, variables=["sliding_mode"]).data_vars.keys() == {"sliding_mode"}
+
+
+FURTHER_RESULT = """
+import slipsweep
+for solver in ("cycle", slipsweep.Step("trapezoid", 64)):
+    found = slipsweep.sweep(
+        5, 0.4, [1.0, 4.0], 2.0, excitation="triangle", solver=solver, variables=["lucky"]
+    )
+    print(found.lucky.attrs["units"], found.lucky.values.tolist())
+"""
+
+
+def test_a_kernel_result_is_added_in_one_place(tmp_path: Path) -> None:
+    """A field of `Motion` that `model.variables` names: no kernel and nothing of the grid changes."""
+    package = tmp_path / "slipsweep"
+    source = Path(slipsweep.__file__).parent
+    shutil.copytree(source, package, ignore=shutil.ignore_patterns("__pycache__"))
+    results = "\nRESULTS: dict[str, dict[str, Any]] = {\n"
+    for module, line, added in (
+        ("kernels/block.py", "    continuous_pulses: float\n", "    lucky: float = 7.0\n"),
+        ("model/variables.py", results, '    "lucky": _cf("1", "a number"),\n'),
+    ):
+        text = (package / module).read_text(encoding="utf-8")
+        assert text.count(line) == 1
+        (package / module).write_text(text.replace(line, line + added), encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-c", FURTHER_RESULT],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_DISABLE_JIT": "1"},
+    )
+    assert (done.stdout, done.stderr) == ("1 [7.0, 7.0]\n" * 2, "")
 
 
 def test_progress_counts_every_cell_once() -> None:
@@ -322,6 +396,7 @@ def test_attributes_tell_how_it_was_made() -> None:
     stepped = slipsweep.sweep(**GOOD, model="newmark", solver=slipsweep.Step(rule="simpson")).attrs
     assert (stepped["rule"], stepped["steps_per_cycle"]) == ("simpson", 1024)
     assert not {"rise", "recoupling"} & {*stepped}
+    assert "10.1680/geot.1965.15.2.139" in stepped["references"]
     assert slipsweep.friction_parameters(5.0, 0.38, 3.0).attrs.keys() == {
         "title",
         "source",
@@ -511,12 +586,13 @@ def test_a_grid_too_large_for_memory_is_refused() -> None:
 # ---------------------------------------------------------------------------------- memory
 
 MEMORY = """
-import resource, sys
+from pathlib import Path
 import numpy as np, xarray as xr
 import slipsweep
 
-def peak():
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+def peak():  # not of getrusage: what that tells of a process begins with the memory of its parent
+    status = Path('/proc/self/status').read_text()
+    return int(status.partition('VmHWM:')[2].split()[0]) * 1024
 
 def run(sizes):
     return {call}
@@ -533,7 +609,9 @@ AXES_OF = (
 )
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="measures memory the POSIX way")
+@pytest.mark.skipif(
+    not Path("/proc/self/status").exists(), reason="asks Linux for the memory of a process"
+)
 @pytest.mark.parametrize(
     "call",
     [

@@ -2,11 +2,10 @@
 
 import multiprocessing
 import os
-import signal
 import subprocess
 import sys
 import threading
-import time
+from collections.abc import Collection, Iterator
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from typing import Any
 
@@ -14,7 +13,8 @@ import numpy as np
 import pytest
 
 import slipsweep
-from slipsweep.grid import threads
+from slipsweep.grid import solvers, threads
+from slipsweep.kernels.block import UNSOLVED
 
 GRID: dict[str, Any] = {
     "theta": np.linspace(0.0, 15.0, 60),
@@ -26,7 +26,8 @@ GRID: dict[str, Any] = {
 
 def displacement(waveform: str = "sine") -> np.ndarray:
     result = slipsweep.sweep(**GRID, excitation=waveform, variables=["permanent_displacement"])
-    return result.permanent_displacement.values
+    values: np.ndarray = result.permanent_displacement.values
+    return values
 
 
 @pytest.fixture(scope="module")
@@ -53,9 +54,13 @@ def test_as_many_threads_as_cores() -> None:
     assert count_in_process() == cores
 
 
-@pytest.mark.parametrize("name", ["NUMBA_NUM_THREADS", "OMP_NUM_THREADS"])
-def test_environment_limits_threads(name: str) -> None:
-    assert count_in_process(**{name: "1"}) == 1
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("NUMBA_NUM_THREADS", "1"), ("OMP_NUM_THREADS", "1"), ("OMP_NUM_THREADS", "1,4")],
+)
+def test_environment_limits_threads(name: str, value: str) -> None:
+    """Of a list, a number for each level of nesting, the first counts."""
+    assert count_in_process(**{name: value}) == 1
 
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="no affinity here")
@@ -69,6 +74,89 @@ def test_affinity_limits_threads() -> None:
         "import os, slipsweep.grid.threads; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})"
     )
     assert count_in_process(code=late) == 1
+
+
+# ------------------------------------------------------------------------------- spreading
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_every_part_is_done_once(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(threads, "thread_count", lambda: count)
+    done: list[int] = []
+    threads.spread(range(1000), done.append)
+    assert sorted(done) == [*range(1000)]
+
+
+class Interrupted(list[int]):
+    """Parts; Ctrl-C is pressed when the last of them has been handed in."""
+
+    def __iter__(self) -> Iterator[int]:
+        yield from super().__iter__()
+        raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize(
+    ("count", "parts", "error"),
+    [
+        (1, range(1000), ZeroDivisionError),
+        (2, range(1000), ZeroDivisionError),
+        (2, Interrupted(range(1000)), KeyboardInterrupt),
+    ],
+)
+def test_an_error_in_a_part_ends_the_whole(
+    count: int,
+    parts: Collection[int],
+    error: type[BaseException],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It is raised, parts that have not begun are left out, and no thread stays behind."""
+    monkeypatch.setattr(threads, "thread_count", lambda: count)
+    ending = threading.Event()
+    shutdown = ThreadPoolExecutor.shutdown
+
+    def announced(pool: ThreadPoolExecutor, **options: Any) -> None:
+        shutdown(pool, **options | {"wait": False})
+        ending.set()
+        shutdown(pool)
+
+    monkeypatch.setattr(ThreadPoolExecutor, "shutdown", announced)
+    begun: list[int] = []
+
+    def work(part: int) -> None:
+        begun.append(part)
+        if part == 1 and error is ZeroDivisionError:
+            raise ZeroDivisionError
+        if part > 1 or error is KeyboardInterrupt:
+            ending.wait(60)
+
+    before = threading.active_count()
+    with pytest.raises(error):
+        threads.spread(parts, work)
+    assert {0, 1} >= {*begun} - {2, 3}
+    assert len(begun) <= 2 * count
+    assert threading.active_count() == before
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_an_error_in_a_tile_leaves_the_sweep(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its results would be memory that nothing has written."""
+    monkeypatch.setattr(threads, "thread_count", lambda: count)
+    solver_of = solvers.solver_of
+
+    def failing(*arguments: Any) -> Any:
+        solver = solver_of(*arguments)
+
+        def solve(cells: np.ndarray, results: np.ndarray) -> None:
+            solver.solve(cells, results)
+            results[solver.rows["validity"], cells["mu_s"] > 0.899] = UNSOLVED
+
+        return solver._replace(solve=solve)
+
+    monkeypatch.setattr(solvers, "solver_of", failing)
+    with pytest.raises(
+        slipsweep.RunError, match=r"mu_s = 0\.9, .*an event of the motion was not found"
+    ):
+        slipsweep.sweep(**GRID, variables=["permanent_displacement"])
 
 
 # ------------------------------------------------------------------------------- who calls
@@ -94,7 +182,7 @@ def test_dasks_threads(expected: np.ndarray) -> None:
     "method", [m for m in ("fork", "spawn") if m in multiprocessing.get_all_start_methods()]
 )
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
-def test_processes(method: str, expected: np.ndarray) -> None:
+def test_processes_forked_or_not_give_the_same_bits(method: str, expected: np.ndarray) -> None:
     """Forked after a sweep, too: no thread is left that a child could miss; and kernels that are loaded give the bits
     of those that were compiled here."""
     # a process that is not forked takes two seconds to start
@@ -108,52 +196,57 @@ def test_processes(method: str, expected: np.ndarray) -> None:
 
 # ---------------------------------------------------------------------------------- Ctrl-C
 
+#: Sweeps of minutes, and their cells.
 LONG = {
-    "cycle": "np.linspace(0, 20, 2000), np.linspace(0.2, 0.9, 2000), np.linspace(0.5, 13, 500), 1.0, "
-    "variables=['sliding_mode']",
-    "frequencies": "np.linspace(0, 20, 300), np.linspace(0.2, 0.9, 300), 3.0, np.linspace(0.1, 9, 20_000), "
-    "variables=['sliding_mode']",
-    "step": "np.linspace(0, 20, 200), np.linspace(0.2, 0.9, 200), np.linspace(0.5, 13, 500), 1.0, "
-    "solver=slipsweep.Step(steps_per_cycle=1_000_000), variables=['permanent_displacement']",
+    "cycle": (
+        "np.linspace(0, 20, 2000), np.linspace(0.2, 0.9, 2000), np.linspace(0.5, 13, 500), 1.0, "
+        "variables=['sliding_mode']",
+        2000 * 2000 * 500,
+    ),
+    "frequencies": (
+        "np.linspace(0, 20, 300), np.linspace(0.2, 0.9, 300), 3.0, np.linspace(0.1, 9, 20_000), "
+        "variables=['sliding_mode']",
+        300 * 300 * 20_000,
+    ),
+    "step": (
+        "np.linspace(0, 20, 20), np.linspace(0.2, 0.9, 20), np.linspace(0.5, 13, 50), 1.0, "
+        "solver=slipsweep.Step(steps_per_cycle=1_000_000), variables=['permanent_displacement']",
+        20 * 20 * 50,
+    ),
 }
 
-
-#: Says when a sweep of each kind begins, and that it was interrupted.
+#: Sends itself Ctrl-C when the first cells of a sweep are solved, and prints how many were in all.
 INTERRUPTED = f"""
+import os, signal
 import numpy as np, slipsweep
-for options in ({{}}, {{"solver": slipsweep.Step(steps_per_cycle=8)}}):
-    slipsweep.sweep(1.0, 0.38, 3.0, 1.0, **options)  # machine code
-for sweep in ({", ".join(f"lambda: slipsweep.sweep({arguments})" for arguments in LONG.values())}):
-    print("ready", flush=True)
-    try: sweep()
-    except KeyboardInterrupt: print("interrupted", flush=True)
+
+def interrupt(cells):
+    if not solved:
+        os.kill(os.getpid(), signal.SIGINT)
+    solved.append(cells)
+
+for sweep in (
+    {", ".join(f"lambda: slipsweep.sweep({text}, progress=interrupt)" for text, _ in LONG.values())}
+):
+    solved = []
+    try:
+        sweep()
+    except KeyboardInterrupt:
+        print(sum(solved))
 """
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")
 @pytest.mark.parametrize("limit", ["", "1"], ids=["threads", "one"])
-def test_an_interrupt_is_heard_at_once(limit: str) -> None:
-    streams: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    environment = {**os.environ, "OMP_NUM_THREADS": limit}
-    with subprocess.Popen(
-        [sys.executable, "-c", INTERRUPTED], env=environment, **streams
-    ) as process:
-        assert process.stdout is not None
-        stop = threading.Timer(120, process.kill)
-        stop.start()
-        try:
-            for kind in LONG:
-                assert process.stdout.readline() == "ready\n", (kind, process.communicate()[1])
-                time.sleep(0.2)
-                assert process.poll() is None, f"{kind}: over before it could be interrupted"
-                process.send_signal(signal.SIGINT)
-                sent = time.monotonic()
-                assert process.stdout.readline() == "interrupted\n", kind
-                # generous: a call of a kernel takes a tenth of a second at most, on a machine that
-                # others use, too
-                assert time.monotonic() - sent < 20.0, kind
-            assert process.communicate(timeout=60) == ("", "")
-        finally:
-            stop.cancel()
-            process.kill()
-    assert process.returncode == 0
+def test_an_interrupt_ends_a_sweep_long_before_its_end(limit: str) -> None:
+    """Ctrl-C is heard between two calls of a kernel, of which a sweep has many."""
+    done = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED],
+        env={**os.environ, "OMP_NUM_THREADS": limit},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stderr == ""
+    for (kind, (_, cells)), solved in zip(LONG.items(), done.stdout.split(), strict=True):
+        assert int(solved) < 0.6 * cells, kind

@@ -1,18 +1,23 @@
 """Compiled kernels on disk: one process compiles, an old one is never served, and without a folder all still runs."""
 
+import errno
+import json
 import os
 import shutil
-import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
+import numba
 import numpy as np
+import platformdirs
 import pytest
 
 import slipsweep
 from slipsweep.jit import compiling
+from tests.support.no_locks import refusing_locks
 
 PACKAGE = Path(slipsweep.__file__).parent
 
@@ -53,10 +58,61 @@ def environment(tmp_path: Path, **others: str) -> dict[str, str]:
     )
 
 
-def run(code: str, env: dict[str, str], *arguments: str) -> str:
+#: Damages each file of a kernel in turn, and says what the kernel returns then, and if it was compiled.
+DAMAGED = """
+import json
+import sys
+import warnings
+from pathlib import Path
+import numpy as np
+sys.path.insert(0, sys.argv[1])
+from ofown import kernel_of_own
+from slipsweep.jit import compiling
+function = kernel_of_own.__wrapped__
+warnings.simplefilter("error")
+def returned():
+    before = compiling.seconds
+    value = compiling.kernel(function)(np.arange(6.0))
+    return value, compiling.seconds > before
+def damages(content):
+    half = len(content) // 2
+    for length in (0, 1, half, len(content) - 1):
+        yield content[:length]
+    yield bytes(len(content))
+    yield content[:half] + bytes(len(content) - half)
+    yield b"\\x80\\x05garbage" * 100
+    yield None
+print(json.dumps(["whole", *returned(), *returned()]))
+files = [*compiling.cache_folder().rglob("*.nb[ic]"), *compiling.cache_folder().glob("*.sha256")]
+for path in files:
+    for damage in damages(path.read_bytes()):
+        path.unlink() if damage is None else path.write_bytes(damage)
+        print(json.dumps([path.suffix, *returned(), *returned()]))
+"""
+
+
+def process(
+    code: str,
+    env: dict[str, str],
+    *arguments: str,
+    preexec_fn: Callable[[], None] | None = None,
+) -> "subprocess.CompletedProcess[str]":
     command = [sys.executable, "-c", code, *arguments]
-    done = subprocess.run(command, env=env, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        command, env=env, capture_output=True, text=True, check=False, preexec_fn=preexec_fn
+    )
     assert done.returncode == 0, done.stderr
+    return done
+
+
+def limited() -> None:
+    import resource  # which Windows does not have
+
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1_000, 1_000))
+
+
+def run(code: str, env: dict[str, str], *arguments: str) -> str:
+    done = process(code, env, *arguments)
     assert not done.stderr
     return done.stdout.strip()
 
@@ -72,7 +128,7 @@ def test_of_eight_processes_that_start_at_once_one_compiles_also_where_two_are_k
     while not (tmp_path / "cache").exists() and running[0].poll() is None:
         time.sleep(0.01)
     for one in running[:2]:
-        one.send_signal(signal.SIGKILL)
+        one.kill()
     found = [one.communicate()[0].split() for one in running[2:]]
     assert all(one.returncode == 0 for one in running[2:])
     assert [float(value) for value, _ in found] == pytest.approx([TOTAL] * 6)
@@ -94,33 +150,68 @@ def test_a_changed_equation_is_never_served_from_an_old_cache(tmp_path: Path) ->
     assert run(PARAMETERS, env) == "-3.22"
 
 
-@pytest.mark.parametrize("why", ["no home", "a folder that others may write to", "no compilation"])
-def test_without_a_folder_of_its_own_all_still_runs(tmp_path: Path, why: str) -> None:
+def test_a_kernel_whose_files_a_power_cut_left_empty_or_short_is_compiled_anew(
+    tmp_path: Path,
+) -> None:
+    lines = run(DAMAGED, environment(tmp_path), str(tmp_path)).splitlines()
+    rows = [json.loads(line) for line in lines]
+    assert [row[0] for row in rows] == ["whole", *[".nbc"] * 8, *[".nbi"] * 8, *[".sha256"] * 8]
+    for kind, value, compiled, again, compiled_again in rows:
+        assert value == again == pytest.approx(TOTAL), kind
+        assert compiled, kind
+        assert not compiled_again, kind
+
+
+@pytest.mark.parametrize("error", [errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS])
+def test_kernels_are_kept_where_the_file_system_has_no_locks(tmp_path: Path, error: int) -> None:
+    env = environment(tmp_path)
+    found = [process(ONE, env, str(tmp_path), preexec_fn=refusing_locks(error)) for _ in range(2)]
+    assert [done.stdout.split()[1] for done in found] == ["True", "False"]
+    assert [done.stderr for done in found] == ["", ""]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="takes homes and rights away the POSIX way")
+@pytest.mark.parametrize(
+    ("why", "reason"),
+    [
+        ("no home", ": /dev/null"),
+        ("a folder that others may write to", "/slipsweep: other users may write to it"),
+        ("a full disk", "anew: File too large; NUMBA_CACHE_DIR sets another folder"),
+        ("no compilation", ""),
+    ],
+)
+def test_without_a_folder_of_its_own_all_still_runs_and_the_reason_is_said(
+    tmp_path: Path, why: str, reason: str
+) -> None:
     env = environment(tmp_path)
     if why == "no home":
         env.pop("HOME", None)
         env["XDG_CACHE_HOME"] = "/dev/null/no-folder"
     elif why == "no compilation":
         env["NUMBA_DISABLE_JIT"] = "1"
-    else:
+    elif why == "a folder that others may write to":
         folder = tmp_path / "cache" / "slipsweep"
         folder.mkdir(parents=True)
         folder.chmod(0o777)
-    value, compiled = run(ONE, env, str(tmp_path)).split()
+    preexec_fn = limited if why == "a full disk" else None
+    done = process(ONE, env, str(tmp_path), preexec_fn=preexec_fn)
+    value, compiled = done.stdout.split()
     assert float(value) == pytest.approx(TOTAL)
     assert (compiled == "True") == (why != "no compilation")
     assert not list((tmp_path / "cache").rglob("*.nbi"))
+    warning = "RunWarning: compiled kernels cannot be kept, and each process compiles them anew: "
+    assert (warning in done.stderr) == bool(reason)
+    assert reason in done.stderr
 
 
 def test_old_versions_are_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compiling.numba.config, "CACHE_DIR", "")
-    monkeypatch.setattr(compiling.platformdirs, "user_cache_path", lambda name: tmp_path / name)
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+    monkeypatch.setattr(platformdirs, "user_cache_path", lambda: tmp_path)
     compiling.cache_folder.cache_clear()
     for number in range(9):
         (tmp_path / "slipsweep" / f"{number:016x}").mkdir(parents=True)
     (tmp_path / "slipsweep").chmod(0o700)
     folder = compiling.cache_folder()
     compiling.cache_folder.cache_clear()
-    assert folder is not None
     assert folder.exists()
     assert len(list((tmp_path / "slipsweep").iterdir())) == 4

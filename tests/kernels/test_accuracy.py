@@ -176,6 +176,23 @@ def test_pulses_that_stop_anew(theta: float, mu_s: float, amplitude: float) -> N
     assert np.ptp(np.diff([float(u) for u in grown])) > 0.1 * grown[0], "cycles are alike"
 
 
+def test_b_is_held_where_eq4_falls_on_the_rise() -> None:
+    """On a steep plane Eq. 4 rises, turns, and falls while the base still rises: b stays at its largest value."""
+    cell: strategies.Cell = {
+        "theta": 45.0,
+        "mu_s": 1.5,
+        "amplitude": 7.848,
+        "frequency": 1.0,
+        "yield_acceleration": 0.2,
+        "decay_rate": 1.1,
+        "delta_mu": 0.0,
+        "waveform": "triangle",
+        "cycles": 1,
+    }
+    moved = assert_is_reference(cell, 1e-12, 0.0).permanent_displacement
+    assert float(moved) == pytest.approx(3.2776, abs=5e-5)
+
+
 @pytest.mark.parametrize("excitation", [slipsweep.Sine(cycles=20), slipsweep.Cosine(cycles=20)])
 def test_pulses_that_stop_anew_as_event_by_event(excitation: Any) -> None:
     """A sweep follows them by what it knows of a pulse, a time history from event to event."""

@@ -32,9 +32,8 @@ def integrated(wave: str, r: float) -> float:
     def stops(_: float, state: np.ndarray) -> float:
         return float(state[0])
 
-    # type: ignore[attr-defined]
-    stops.terminal = True
-    stops.direction = -1.0
+    stops.terminal = True  # type: ignore[attr-defined]
+    stops.direction = -1.0  # type: ignore[attr-defined]
     state = np.array([0.0, 0.0])
     for start, end in itertools.pairwise(ends):
         if end <= onset:

@@ -9,21 +9,26 @@ import pytest
 import slipsweep
 from slipsweep import RunError
 from slipsweep.grid import solvers
-from slipsweep.kernels import events
+from slipsweep.kernels import events, step
 from slipsweep.kernels.block import UNSOLVED
 
 
-@numba.njit(error_model="numpy")
+@numba.njit(error_model="numpy")  # type: ignore[untyped-decorator]
 def _power(where: tuple[float, float], x: float) -> tuple[float, float]:
     root, power = where
     return math.copysign(abs(x - root) ** power, x - root), power * abs(x - root) ** (power - 1.0)
 
 
-_root = events.root_of(_power)
+_root_of_power = events.root_of(_power)
+
+
+@numba.njit  # type: ignore[untyped-decorator]
+def _root(where: tuple[float, float], below: float, above: float) -> float:
+    return _root_of_power(where, below, above, above, 0.0)
 
 
 def found(root: float, power: float, below: float, above: float) -> float:
-    return float(_root((root, power), below, above, above, 0.0))
+    return float(_root((root, power), below, above))
 
 
 @pytest.mark.parametrize("root", [1e-300, 0.3, 0.9999999])
@@ -57,8 +62,8 @@ def failing(*arguments: Any) -> None:
 def test_a_cell_that_is_not_solved_ends_the_run_and_is_named(
     options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(solvers, "solve_waves", failing)
-    monkeypatch.setattr(solvers, "solve_steps", failing)
+    monkeypatch.setattr(solvers, "solve_walk", failing)
+    monkeypatch.setattr(step, "solve_steps", failing)
     axes: dict[str, Any] = {
         "theta": [0.0, 5.0],
         "mu_s": 0.3,
@@ -72,7 +77,7 @@ def test_a_cell_that_is_not_solved_ends_the_run_and_is_named(
 
 
 def test_a_cell_of_a_record_that_is_not_solved_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(solvers, "solve_record", failing)
+    monkeypatch.setattr(solvers, "solve_walk", failing)
     record = slipsweep.Record.sampled([0.0, 3.0, -3.0, 0.0], 0.1)
     axes: dict[str, Any] = {
         "theta": [0.0, 5.0],

@@ -245,10 +245,7 @@ ESTIMATED = Validity.FRICTION_ESTIMATED
         (STUCK, Validity.FRICTION_NOT_DECAYING),
         ({**STUCK, "decay_rate": 1.0}, 0),
         ({**COULOMB, "amplitude": 3.2}, Validity.YIELD_GOVERNS),
-        (
-            {**COULOMB, "rise": "literal", "amplitude": 3.2},
-            Validity.YIELD_GOVERNS | Validity.KD_NOT_POSITIVE,
-        ),
+        ({**COULOMB, "rise": "literal", "amplitude": 3.2}, Validity.KD_NOT_POSITIVE),
         ({"amplitude": 4.0}, Validity.NOT_RECOUPLED | ESTIMATED),
         ({"amplitude": 4.0, "cycles": 1}, ESTIMATED),
         ({"amplitude": 4.0, "recoupling": "integrate"}, ESTIMATED),

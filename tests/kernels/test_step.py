@@ -1,29 +1,21 @@
-"""The stepping kernel: orders and errors against 30 digits, hard cases, another friction law, Eq. 12 by hand."""
+"""The stepping kernel: orders and errors against 30 digits, hard cases, Eq. 12 by hand, records, histories."""
 
 from collections.abc import Iterable, Sequence
-from math import asin, cos, isfinite, pi, radians, sin, sqrt, tan
+from math import asin, cos, isfinite, pi, sin, sqrt
 from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 
 import slipsweep
 from slipsweep import Step
-from slipsweep.jit.compiling import kernel
-from slipsweep.jit.decorators import inlined, registered
-from slipsweep.kernels.block import EQ12, INTEGRATE, MONOTONE, Cell, Motion, Options
-from slipsweep.kernels.step import RECTANGLE, SIMPSON, TRAPEZOID, Steps, solve_cell
-from slipsweep.model.friction import FrictionLaw
-from slipsweep.model.variables import VALUELESS, Validity
-from slipsweep.motion.cutting import wave_of
+from slipsweep.model.variables import HISTORY, VALUELESS, Validity
 from slipsweep.motion.waveforms import Sine, Square, Triangle, Waveform
 from tests.support.cases import Case, Found, choices, read_cases
 from tests.support.cases import solve as by_sweeps
 
 G = 9.81
-RULES = {"rectangle": RECTANGLE, "trapezoid": TRAPEZOID, "simpson": SIMPSON}
+RULES = ("rectangle", "trapezoid", "simpson")
 ORDERS = {"rectangle": 1, "trapezoid": 2, "simpson": 4}
 EVERY_RULE = pytest.mark.parametrize("rule", RULES)
 
@@ -159,7 +151,8 @@ def test_modes_and_flags() -> None:
         assert (Validity.NOT_RECOUPLED in validity) == (sticks_and_slips and not case.recoupled), (
             f"case {case}"
         )
-        governs = sticks_and_slips and case.eq4_below_yield and case.model != "newmark"
+        governs = sticks_and_slips and case.eq4_below_yield
+        governs = governs and case.model != "newmark" and case.rise == "monotone"
         assert (Validity.YIELD_GOVERNS in validity) == governs, f"case {case}"
 
 
@@ -173,22 +166,28 @@ def test_modes_and_flags_of_every_waveform() -> None:
         assert np.isnan(found[case.case][0]) == bool(case.validity & VALUELESS), f"case {case}"
 
 
+#: Categories of hard_cases.csv with a layer of friction, or a slide, that is thinner than a step.
+THINNER_THAN_A_STEP = ("sharp_decay", "tangential_onset")
+
+#: Cycles beyond which a case is not stepped: no two of them are alike, so that each is walked.
+MOST_CYCLES = 1000
+
+
 @EVERY_RULE
 def test_hard_cases_converge_at_first_order(rule: str) -> None:
-    """Slides and layers of friction shorter than steps, 10^6 cycles, rounding at its worst: worst of three step counts.
+    """Slides shorter than steps, rounding at its worst: the worst of three step counts.
 
     Sixteen times the steps, a twelfth of the error, until it is 100 times what one ulp of the
     inputs does, or 1e-16 A/omega^2 (a slide of less than that, at a tangential onset).  Over 1000
-    cycles and more the rounding of V in one, 1e-14 A/omega, adds up with their square
+    cycles the rounding of V in one, 1e-14 A/omega, adds up with their square
     (docs/hard-cases.md).
     """
+    cases = [case for case in HARD_CASES if case.sliding_mode >= 0 and case.cycles <= MOST_CYCLES]
     counts = [1024, 1192, 1360]
-    coarse = [solve_cases(HARD_CASES, rule, count) for count in counts]
-    fine = [solve_cases(HARD_CASES, rule, 16 * count) for count in counts]
+    coarse = [solve_cases(cases, rule, count) for count in counts]
+    fine = [solve_cases(cases, rule, 16 * count) for count in counts]
     slow = []
-    for case in HARD_CASES:
-        if case.sliding_mode < 0:
-            continue
+    for case in cases:
         for run in (*coarse, *fine):
             assert isfinite(run[case.case][0]), f"displacement of case {case}"
             assert 0 <= run[case.case][1] < np.inf, f"peak velocity of case {case}"
@@ -197,7 +196,11 @@ def test_hard_cases_converge_at_first_order(rule: str) -> None:
         )
         rounding = pi * 1e-14 * case.cycles**2 if case.cycles >= 1000 else 1e-16
         least = rounding * case.displacement_scale / float(case.displacement_bound)
-        if not after <= max(100.0, least, before / 16**0.9):
+        if case.category in THINNER_THAN_A_STEP:
+            error = after * float(case.displacement_bound)
+            u = abs(float(case.permanent_displacement))
+            assert error <= 2e-3 * u + 1e-12 * case.displacement_scale, f"case {case}"
+        elif not after <= max(100.0, least, before / 16**0.9):
             slow.append(f"case {case}: {before:.1e} to {after:.1e} times the conditioning bound")
     assert not slow
 
@@ -267,143 +270,86 @@ def test_eq12_by_hand() -> None:
     assert (2 * pi) ** 2 * float(found.permanent_displacement) == pytest.approx(exact, rel=1e-9)
 
 
-# ------------------------------------------------------------------ another law
+# ------------------------------------------------------------------ records and histories
+
+OPTIONS = [
+    slipsweep.Mendez(),
+    slipsweep.Mendez(rise="literal"),
+    slipsweep.Mendez(recoupling="integrate"),
+    slipsweep.Newmark(),
+]
 
 
-@registered  # so that the kernel is kept for the next run
-def hyperbolic_friction(
-    x: float, mu_s: float, delta_mu: float, decay_rate: float, g: float
-) -> float:
-    return mu_s / (1.0 + decay_rate * abs(x) / g)
-
-
-@inlined
-def hyperbolic() -> FrictionLaw:
-    return FrictionLaw(hyperbolic_friction)
-
-
-def test_a_law_says_what_it_lacks_for_the_exact_kernel() -> None:
-    assert FrictionLaw(hyperbolic_friction).missing == FrictionLaw._fields[1:]
-
-
-@kernel
-def solve_hyperbolic(cell: Cell, options: Options, wave: Any, steps: Steps) -> Motion:
-    return solve_cell(hyperbolic(), cell, options, wave, steps)
-
-
-class Hyperbolic:
-    """Üg = A sin φ and Eq. 4 with that friction, for SciPy."""
-
-    def __init__(
-        self, theta: float, mu_s: float, amplitude: float, least: float, decay_rate: float
-    ) -> None:
-        self.tangent = tan(radians(theta))
-        self.mu_s = mu_s
-        self.amplitude = amplitude
-        self.least = least
-        self.decay_rate = decay_rate
-
-    def rate(self, x: float) -> float:
-        """Üg − Ü."""
-        friction = self.mu_s / (1.0 + self.decay_rate * abs(x) / G)
-        n = G + x * self.tangent
-        lag = n * (self.mu_s - self.tangent - friction) + G * self.tangent
-        return lag if x >= 0 else -lag
-
-    def found(
-        self, rule: str, steps_per_cycle: int, cycles: int, recoupling: str = "eq12"
-    ) -> Motion:
-        cell = Cell(
-            self.tangent, self.mu_s, self.amplitude, self.least, self.decay_rate, 0.0, np.nan
-        )
-        wave = wave_of(Sine(cycles=cycles))
-        steps = Steps(RULES[rule], steps_per_cycle, np.empty((2, 2 * steps_per_cycle + 1)))
-        options = Options(
-            MONOTONE, EQ12 if recoupling == "eq12" else INTEGRATE, cycles, wants_peak=True, g=G
-        )
-        return solve_hyperbolic(cell, options, wave, steps)
-
-    def integrate(
-        self, start: float, end: float, state: Any, rate: Any, stops: bool = False
-    ) -> tuple[Any, float]:
-        """V and W at the end or at the stop, and where that is."""
-
-        def stop(t: float, y: Any) -> float:
-            return float(y[0])
-
-        # type: ignore[attr-defined]
-        stop.terminal = True
-        stop.direction = -1.0
-        solution = solve_ivp(
-            lambda t, y: (rate(self.amplitude * sin(t)), y[0]),
-            (start, end),
-            state,
-            "DOP853",
-            rtol=1e-11,
-            atol=1e-13,
-            events=stop if stops else None,
-        )
-        return solution.y[:, -1], float(solution.t[-1])
-
-    def stick_slip(self, recoupling: str) -> float:
-        """W of one pulse from rest to rest: b = max(b, Eq. 4) on the rise, held on the fall, Eq. 12 from t5 on."""
-        x = np.linspace(self.least, self.amplitude, 10_000)
-        eq4 = np.array([value - self.rate(value) for value in x])
-        assert (np.diff(eq4) > 0).all(), "Eq. 4 rises"
-        begins = self.least
-        if self.rate(begins) <= 0.0:  # t1 lies beyond Üy
-            begins = brentq(self.rate, self.least, self.amplitude, xtol=1e-15)
-        held = max(self.least, float(eq4[-1]))
-        switch = begins
-        if begins - self.rate(begins) < self.least < eq4[-1]:
-            switch = brentq(
-                lambda v: v - self.rate(v) - self.least, begins, self.amplitude, xtol=1e-15
+@pytest.mark.parametrize("model", OPTIONS, ids=str)
+def test_records_are_stepped_as_they_are_walked(model: Any) -> None:
+    """300 cells under records: modes alternate, pulses do not re-stick, v is upslope at times."""
+    rng = np.random.default_rng(6)
+    times: Any = np.arange(120) * 0.04
+    for _ in range(5):
+        samples = rng.normal(size=times.size).cumsum()
+        record = slipsweep.Record(times, samples - np.linspace(samples[0], samples[-1], 120))
+        block: dict[str, Any] = {
+            "theta": [2.0, 9.0, 17.0],
+            "mu_s": [0.35, 0.6],
+            "yield_acceleration": [0.3, 1.2],
+            "amplitude": [1.5, 3.0, 4.5, 7.0, 11.0],
+            "excitation": record,
+            "model": model,
+        }
+        names = ["permanent_displacement", "peak_relative_velocity", "validity"]
+        names += ["number_of_slips", "stick_slip_pulses", "continuous_pulses"]
+        exact = slipsweep.sweep(**block, variables=names)
+        stepped = slipsweep.sweep(**block, variables=names, solver=Step("simpson", 1024))
+        upslope = np.int16(Validity.UPSLOPE)  # the sign of what is 0 to rounding
+        same = (exact.validity & ~upslope) == (stepped.validity & ~upslope)
+        assert same.all(), exact.validity.values[~same.values]
+        for name in names[3:]:
+            np.testing.assert_array_equal(stepped[name], exact[name])
+        for name in names[:2]:
+            scale = float(np.abs(exact[name]).max())  # NaN, where no cell has a value
+            np.testing.assert_allclose(
+                stepped[name], exact[name], rtol=1e-7, atol=1e-9 * np.nan_to_num(scale)
             )
-        phases = [asin(begins / self.amplitude), asin(min(switch / self.amplitude, 1.0)), pi / 2]
-        state, _ = self.integrate(phases[0], phases[1], [0.0, 0.0], lambda x: x - self.least)
-        state, _ = self.integrate(
-            phases[1], phases[2], state, self.rate if eq4[-1] > self.least else lambda x: x - held
-        )
-        end = pi if recoupling == "eq12" else 2 * pi
-        state, at = self.integrate(phases[2], end, state, lambda x: x - held, stops=True)
-        return float(state[1]) + (state[0] ** 2 / (2 * held) if at == pi else 0.0)
-
-    def continuous(self, cycles: int) -> float:
-        state = np.zeros(2)
-        start = asin(self.least / self.amplitude)
-        for end in [*np.arange(1, 2 * cycles + 1) * pi]:
-            side = 1.0 if sin(0.5 * (start + end)) > 0 else -1.0
-            state, _ = self.integrate(
-                start, end, state, lambda x, side=side: self.rate(side * max(side * x, 1e-300))
-            )
-            start = end
-        return float(state[1])
 
 
-@pytest.mark.parametrize("recoupling", ["eq12", "integrate"])
+def test_steps_under_a_record_are_of_second_order() -> None:
+    """By the trapezoid: `steps_per_cycle` is 64 times the steps between two samples."""
+    times: Any = np.arange(200) * 0.02
+    record = slipsweep.Record(times, 5.0 * np.sin(9.0 * times) * np.exp(-0.3 * times))
+    block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.4, "yield_acceleration": 0.8}
+    exact = slipsweep.sweep(**block, excitation=record).permanent_displacement
+    errors = [
+        abs(
+            slipsweep.sweep(
+                **block, excitation=record, solver=Step("trapezoid", count)
+            ).permanent_displacement
+            / exact
+            - 1.0
+        ).item()
+        for count in (64, 256, 1024)
+    ]
+    orders = np.log2(np.array(errors[:-1]) / errors[1:]) / 2.0
+    assert (abs(orders - 2.0) < 0.3).all(), errors
+
+
 @pytest.mark.parametrize(
-    "block",
+    ("excitation", "model"),
     [
-        Hyperbolic(theta=5.0, mu_s=0.38, amplitude=3.55, least=0.59, decay_rate=1.5),
-        Hyperbolic(theta=5.0, mu_s=0.38, amplitude=3.1, least=2.0, decay_rate=1.0),
-        Hyperbolic(theta=14.0, mu_s=0.5, amplitude=3.0, least=1.5, decay_rate=0.8),
+        (Sine(cycles=5), slipsweep.Mendez()),
+        (Sine(cycles=9, ramp_in=2.5, ramp_out=1), slipsweep.Mendez(recoupling="integrate")),
+        (Square(cycles=3), slipsweep.Newmark()),
+        (slipsweep.Cosine(cycles=4), slipsweep.Mendez(rise="literal")),
     ],
-    ids=["measured", "near Coulomb", "steep"],
+    ids=str,
 )
-def test_another_law_in_stick_slip(block: Hyperbolic, recoupling: str) -> None:
-    """A law of another shape, in ten lines and without an edit in a kernel, as SciPy integrates it."""
-    exact = block.stick_slip(recoupling)
-    for rule, allowed in (("rectangle", 0.02), ("trapezoid", 1e-4), ("simpson", 1e-9)):
-        found = block.found(rule, 2048, 3, recoupling)
-        assert found.sliding_mode == 1
-        assert not int(found.validity) & (VALUELESS | Validity.NOT_RECOUPLED)
-        assert found.displacement == pytest.approx(3 * exact, rel=allowed), rule
-
-
-def test_another_law_in_continuous_sliding() -> None:
-    block = Hyperbolic(theta=6.0, mu_s=0.38, amplitude=5.1, least=0.08, decay_rate=2.3)
-    exact = block.continuous(4)
-    for rule, allowed in (("rectangle", 0.02), ("trapezoid", 1e-4), ("simpson", 1e-8)):
-        found = block.found(rule, 2048, 4)
-        assert found.sliding_mode == 2
-        assert found.displacement == pytest.approx(exact, rel=allowed), rule
+def test_a_history_by_steps_is_the_exact_one(excitation: Any, model: Any) -> None:
+    block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.38, "amplitude": 3.55, "frequency": 1.8}
+    block |= {"yield_acceleration": 0.59, "decay_rate": 2.7, "excitation": excitation}
+    exact = slipsweep.simulate(**block, model=model)
+    # between two samples of which one lies on an event either side of it may be taken
+    times = exact.time.values[:-1] + 0.37 * np.diff(exact.time.values)
+    exact = slipsweep.simulate(**block, model=model, times=times)
+    stepped = slipsweep.simulate(**block, model=model, times=times, solver=Step("simpson", 2048))
+    for name in HISTORY:
+        scale = np.abs(exact[name]).max().item()
+        np.testing.assert_allclose(stepped[name], exact[name], rtol=0, atol=1e-9 * scale)

@@ -58,7 +58,7 @@ def test_every_choice_is_here() -> None:
 
 
 @each
-def test_objects(keyword: str, choice: Choice) -> None:
+def test_choices_are_frozen_and_come_back_from_their_repr(keyword: str, choice: Choice) -> None:
     """Frozen, comparable, hashable, picklable; the repr makes it again."""
     for one in declared(type(choice)):
         with pytest.raises(dataclasses.FrozenInstanceError):

@@ -149,7 +149,9 @@ REFUSED: list[tuple[str, dict[str, Any], str]] = [
 
 
 @pytest.mark.parametrize(("function", "changed", "message"), REFUSED)
-def test_refused(function: str, changed: dict[str, Any], message: str) -> None:
+def test_values_that_no_physics_allows_are_named(
+    function: str, changed: dict[str, Any], message: str
+) -> None:
     with pytest.raises(InputError, match=message) as raised:
         call(function, **changed)
     assert "\n" not in str(raised.value)

@@ -31,7 +31,7 @@ def resampled(record: Record, parts: int) -> Record:
     return Record(times, np.interp(times, record.times, record.acceleration))
 
 
-def test_a_sine() -> None:
+def test_measures_of_a_sine_by_their_closed_forms() -> None:
     amplitude = 3.0
     frequency = 2.0
     cycles = 40
@@ -55,7 +55,7 @@ def test_a_sine() -> None:
         )
 
 
-def test_straight_lines_by_hand() -> None:
+def test_measures_of_two_straight_lines_by_hand() -> None:
     """Up to 1 and down to -1: every number by hand."""
     found = measures([10.0, 11.0, 13.0], [0.0, 1.0, -1.0])
     assert found["pga"] == 1.0

@@ -53,20 +53,32 @@ def write(folder: Path, name: str, text: str) -> Path:
         (f"{AT2}NPTS= 2, DT= .0100 SEC\n .1 .2\n", None, 9.80665),
         ("SAMPLING_INTERVAL_S: 0.01\nNDATA: 2\nUNITS: cm/s^2\n0.1\n0.2\n", None, 0.01),
         ("dt = 0.01 s, in g\n0.1\n0.2\n", "g", 9.80665),
+        (f"{AT2.replace('OF G', 'OF M/S**2')}NPTS= 2, DT= .0100 SEC\n .1 .2\n", None, 1.0),
+        (f"{AT2.replace('OF G', 'OF CM/SEC/SEC')}NPTS= 2, DT= .01 SEC\n .1 .2\n", "gal", 0.01),
+        ("NPTS= 2, DT= .0100 SEC\n .1 .2\n", None, 9.80665),
     ],
 )
-def test_formats(tmp_path: Path, text: str, units: Any, factor: float) -> None:
+def test_columns_of_times_and_accelerations_in_each_unit(
+    tmp_path: Path, text: str, units: Any, factor: float
+) -> None:
     record = read_record(write(tmp_path, "a", text), units=units)
     np.testing.assert_allclose(record.times, [0.0, 0.01], rtol=1e-15)
     np.testing.assert_allclose(record.acceleration, [0.1 * factor, 0.2 * factor], rtol=1e-15)
 
 
 @pytest.mark.parametrize(
-    "text", ["0.1\n-0.2\n0.3\n", "0.1, -0.2\n0.3\n", "0,1\n-0,2\n0,3\n", "acc (g)\n0.1 -0.2 0.3\n"]
+    ("text", "format"),
+    [
+        ("0.1\n-0.2\n0.3\n", "auto"),
+        ("0.1, -0.2\n0.3\n", "values"),
+        ("0,1\n-0,2\n0,3\n", "auto"),
+        ("acc (g)\n0.1 -0.2 0.3\n", "auto"),
+    ],
 )
-def test_accelerations_alone_with_their_interval(tmp_path: Path, text: str) -> None:
+def test_accelerations_alone_with_their_interval(tmp_path: Path, text: str, format: Any) -> None:
     """As SLAMMER has them: numbers between blanks, commas or lines."""
-    record = read_record(write(tmp_path, "a.txt", text), units="g", interval=0.005)
+    path = write(tmp_path, "a.txt", text)
+    record = read_record(path, units="g", interval=0.005, format=format)
     np.testing.assert_allclose(record.times, [0.0, 0.005, 0.01], rtol=1e-15)
     np.testing.assert_allclose(
         record.acceleration, 9.80665 * np.array([0.1, -0.2, 0.3]), rtol=1e-15
@@ -109,14 +121,14 @@ def test_baseline() -> None:
             "a.csv",
             "0,1\n1,2\n",
             {"units": "g", "channel": 1},
-            "channel = 1: only COSMOS files hold several",
+            "channel = 1: only for a file that holds several",
         ),
         ("a.txt", "1\n2\n", {"units": "g"}, "interval: must be given"),
         (
             "a.txt",
             "0,1\n0.1,2\n",
             {"units": "g", "interval": 0.1},
-            "the first of two columns is that of times",
+            "the first column is that of times",
         ),
         (
             "a.txt",
@@ -137,6 +149,30 @@ def test_baseline() -> None:
             f"{AT2}NPTS= 2, DT= .005 SEC\n 1 2\n",
             {"interval": 0.01},
             "only for a file without times",
+        ),
+        (
+            "a.AT2",
+            f"{AT2.replace('OF G', 'OF M/S**2')}NPTS= 2, DT= .005 SEC\n 1 2\n",
+            {"units": "g"},
+            "units = 'g': the file itself says 'm/s2'",
+        ),
+        (
+            "a.AT2",
+            f"{AT2.replace('OF G', 'OF FT/SEC2')}NPTS= 2, DT= .005 SEC\n 1 2\n",
+            {"units": "g"},
+            "its heading says 'FT/SEC2': must be an acceleration",
+        ),
+        (
+            "a.VT2",
+            "PEER\nA place, 0\nVELOCITY TIME HISTORY IN UNITS OF CM/S\nNPTS= 2, DT= .01\n 1 2\n",
+            {"units": "g"},
+            "its heading says 'VELOCITY in CM/S'",
+        ),
+        (
+            "a.ASC",
+            "SAMPLING_INTERVAL_S: 0.01\nNDATA: 2\nUNITS: cm/s\nDATA_TYPE: VELOCITY\n0.1\n0.2\n",
+            {},
+            "DATA_TYPE: VELOCITY: must be ACCELERATION",
         ),
         ("a.NS", KNET.replace("  -4194", ""), {}, "4 accelerations, where its header says 5"),
         ("a.AT2", f"{AT2}NPTS= many, DT= .005 SEC\n 1 2\n", {}, "no NPTS= in its header"),
@@ -255,7 +291,35 @@ def test_peaks_of_999_gal_are_no_fill_values(tmp_path: Path) -> None:
 def test_what_a_summary_says(tmp_path: Path) -> None:
     path = motion(tmp_path, TIMES, np.where(TIMES == 5.0, 0.3, 0.0))  # a triangle of 0.02 s
     expected = f"{path}: 10 s at 0.01 s, PGA 0.3 g, PGV {0.003 * 9.80665:.4g} m/s, read in g"
+    expected = f"{expected}; caution: 100% of its samples are 0"
     assert read_record(path, units="g").summary() == expected
+
+
+def test_a_clipped_record_is_said(tmp_path: Path) -> None:
+    """At the largest value, the smallest, or both; steps onto it tell it from rounding."""
+    level = 0.6 * np.abs(SHAKING).max()
+    clipped = {
+        f"flat at its largest value {level:.4g} g": np.minimum(SHAKING, level),
+        f"flat at its smallest value {-level:.4g} g": np.maximum(SHAKING, -level),
+    }
+    for text, values in clipped.items():
+        path = motion(tmp_path, TIMES, values)
+        record = read_record(path, units="g", implausible="accept")
+        samples = int((np.abs(values) == level).sum())
+        assert f"; caution: {text} ({samples} samples, first at t = " in record.summary()
+    both = read_record(motion(tmp_path, TIMES, np.clip(SHAKING, -level, level)), units="g")
+    assert all(text in both.attrs["record_caution"] for text in clipped)
+    # written with few digits, each peak is flat as well, but a smallest step from its neighbours
+    for digits in (2, 3):
+        rounded = motion(tmp_path, TIMES, np.round(SHAKING, digits))
+        assert "record_caution" not in read_record(rounded, units="g").attrs
+
+
+def test_a_record_of_which_half_is_zero_is_said(tmp_path: Path) -> None:
+    for values in (np.where(TIMES < 5.0, SHAKING, 0.0), SHAKING * (np.arange(1001) % 2)):
+        record = read_record(motion(tmp_path, TIMES, values), units="g", implausible="accept")
+        assert record.attrs["record_caution"] == "50% of its samples are 0"
+    assert "record_caution" not in read_record(motion(tmp_path), units="g").attrs
 
 
 # --------------------------------------------------------------------------------- ObsPy
@@ -280,6 +344,9 @@ def test_a_trace_of_obspy() -> None:
     ):
         Record.from_obspy(trace(masked), "m/s2")
     assert Record.from_obspy(trace(masked), "m/s2", gaps="linear").times.size == 1000
+    vertical = trace(SHAKING)
+    vertical.id = "XX.ABC..HNZ"
+    assert Record.from_obspy(vertical, "m/s2").attrs["record_caution"] == "vertical component (HNZ)"
     for none, message in (
         (trace(np.arange(5)), "whole numbers, counts of a digitizer"),
         ([1.0], "must be a Trace of"),
@@ -347,6 +414,19 @@ def test_cosmos_with_several_channels(tmp_path: Path) -> None:
         ("      10 acceleration", "      11 acceleration", "10 values, where 11 are announced"),
         ("-100.00001", "-100.0x001", "must be numbers, 10 columns each"),
         ("End-of-data", "end of file", "no line End-of-data"),
+        (
+            "       1       1       4     120",
+            "       3       1       4     120",
+            "is COSMOS V3 (response spectra), which is not read",
+        ),
+        ("     5.000000     0.050000", "     5.000000     0.500000", "real 63 says 0.5 s"),
+        ("     0.005000     0.050000", "     0.005000     0.200000", "real 35 says 0.2 s"),
+        ("     5.000000     0.050000", "    50.000000     0.050000", "every 0.05 s are 0.5 s"),
+        ("approx   0 secs", "approx  70 secs", "the line of its values says 70 s"),
+        ("units=cm/sec2 (04)", "units=g (02)", "says 4 (cm/s2) for the unit, the line of its"),
+        ("units=cm/sec2 (04)", "units=g (04)", "the line of its values units=g (04): damaged"),
+        ("units=cm/sec2 (04)", "units=cm/sec2 (02)", "units=cm/sec2 (02): damaged"),
+        ("units=cm/sec2 (04)", "units=mg (04)", "its heading says 'mg'"),
         (" 100 Real-header", " 100 Complex-header", "line 25"),
     ],
 )

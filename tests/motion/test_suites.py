@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from slipsweep import InputError, Pair, Record, Suite, read_record, read_suite
-from slipsweep.motion.cutting import wave_of_record
-from slipsweep.motion.intensity import arias_intensity, intensity_measures
+from slipsweep.motion.cutting import path_of_record
+from slipsweep.motion.intensity import arias_intensity
+from tests.support.intensity import measures_by_sums
 
 HEADER = "time (s),acceleration (m/s2)\n"
 
@@ -94,7 +95,7 @@ def test_a_suite_is_compared_by_what_is_in_it(folder: Path) -> None:
     assert sent == one == read_suite(folder)
     assert hash(sent) == hash(one)
     # a worker gets it with every chunk, and makes the tables of its records once
-    assert wave_of_record(sent.components[0], 1.0) is wave_of_record(one.components[0], 1.0)
+    assert path_of_record(sent.components[0], 1.0) is path_of_record(one.components[0], 1.0)
     assert one != one[:2]
     assert one[:2] == one[["a", "b"]] == one[[0, 1]]
     changed = read_record(folder / "a.csv").corrected("mean")
@@ -108,8 +109,9 @@ def test_measures_along_the_motions(folder: Path) -> None:
     assert suite.measures["motion_file"].tolist() == ["a.csv", "b.csv", "c.csv"]
     np.testing.assert_allclose(suite.measures["motion_interval"], [0.02, 0.03, 0.01], rtol=1e-14)
     for at, record in enumerate(suite.components):
-        for name, value in intensity_measures(record.times, record.acceleration).items():
-            assert suite.measures[f"motion_{name}"][at] == value
+        for name, value in measures_by_sums(record.times, record.acceleration).items():
+            found = suite.measures[f"motion_{name}"][at]
+            assert found == pytest.approx(value, rel=1e-4, nan_ok=True), name
 
 
 @pytest.mark.parametrize(
@@ -124,7 +126,9 @@ def test_measures_along_the_motions(folder: Path) -> None:
         ((noise(1), noise(2)), ("a", 2), "^labels = .* 2 different texts"),
     ],
 )
-def test_what_is_no_suite(motions: Any, labels: Any, words: str) -> None:
+def test_suites_without_motions_or_with_wrong_labels_are_refused(
+    motions: Any, labels: Any, words: str
+) -> None:
     with pytest.raises(InputError, match=words):
         Suite(motions, labels)
     with pytest.raises(
@@ -213,12 +217,72 @@ def test_pairs_by_the_endings_of_their_names(tmp_path: Path) -> None:
         "one_NS.csv one_EW.csv",
         "two_NS.csv two_EW.csv",
     ]
+    write(tmp_path / "one_UD.csv")
+    assert read_suite(tmp_path, pairs=("_NS", "_EW")).motions == suite.motions
     write(tmp_path / "three_NS.csv")
-    write(tmp_path / "vertical.csv")
+    write(tmp_path / "single.csv")
     with pytest.raises(
-        InputError, match=r"without the other component: three_NS\.csv, vertical\.csv"
+        InputError, match=r"without the other component: single\.csv, three_NS\.csv"
     ):
         read_suite(tmp_path, pairs=("_NS", "_EW"))
     for pairs in ("_NS", ("_NS",), ("_NS", ""), ("_NS", "_NS"), (1, 2)):
         with pytest.raises(InputError, match=r"^pairs = "):
             read_suite(tmp_path, pairs=pairs)  # type: ignore[arg-type]
+
+
+# ------------------------------------------------------------------------------ vertical components
+
+
+def test_vertical_components_are_left_out_and_named(folder: Path) -> None:
+    """By their names, which need not be read, and by their headers; an explicit word takes them."""
+    expected = read_suite(folder)
+    header = "PEER\nA place, 1/1/2000, A station, {}\nACCELERATION IN UNITS OF G\n"
+    at2 = f"{header}NPTS= 3, DT= .01\n0 .1 0\n"
+    (folder / "e.AT2").write_text(at2.format("VERT"))
+    (folder / "RSN1_A-UP.AT2").write_text(at2.format("UP"))
+    (folder / "z.UD").write_text("damaged\n")
+    for paths in (folder, f"{folder}/*", sorted(folder.iterdir())):
+        suite = read_suite(paths)
+        assert suite.motions == expected.motions
+        assert suite.left_out == ("RSN1_A-UP.AT2 (UP)", "e.AT2 (VERT)", "z.UD (UD)")
+        assert "; left out: RSN1_A-UP.AT2 (UP), e.AT2 (VERT), z.UD (UD))" in repr(suite)
+        assert suite.summary().endswith(
+            "left out, vertical components: RSN1_A-UP.AT2 (UP), e.AT2 (VERT), z.UD (UD); "
+            "vertical = 'accept' takes them"
+        )
+        assert suite.attrs["left_out_vertical"] == ", ".join(suite.left_out)
+    with pytest.raises(InputError, match=r"1 of 6 files cannot be read: z\.UD"):
+        read_suite(folder, vertical="accept")
+    (folder / "z.UD").unlink()
+    accepted = read_suite(folder, vertical="accept")
+    assert accepted.labels == ("RSN1_A-UP", "a", "b", "c", "e")
+    assert accepted.left_out == ()
+    assert accepted["e"].attrs["record_caution"] == "vertical component (VERT)"
+    assert accepted.cautions() == [
+        f"caution: {folder / 'RSN1_A-UP.AT2'}: vertical component (UP)",
+        f"caution: {folder / 'e.AT2'}: vertical component (VERT)",
+    ]
+
+
+def test_what_a_suite_of_vertical_components_says(folder: Path) -> None:
+    up = write(folder / "a_UP.csv")
+    with pytest.raises(
+        InputError, match=r"vertical components only: a_UP\.csv \(UP\); vertical = "
+    ):
+        read_suite([up])
+    with pytest.raises(InputError, match=r"vertical components in pairs: a_UP\.csv \(UP\)"):
+        read_suite([(folder / "a.csv", up)])
+    with pytest.raises(InputError, match="vertical = 'no': must be one of 'leave_out', 'accept'"):
+        read_suite(folder, vertical="no")  # type: ignore[arg-type]
+    record = read_record(up)
+    assert read_suite([record]).motions == (record,)  # a Record was chosen by its reader
+
+
+def test_a_vertical_channel_is_left_out(tmp_path: Path) -> None:
+    """Files of three components whose second is vertical in one of them."""
+    for name, heading in (("one", "NS,EW,UD"), ("two", "NS,UD,EW")):
+        rows = "".join(f"{at % 3},{at % 5},{at % 7}\n" for at in range(12))
+        (tmp_path / f"{name}.csv").write_text(f"dt = 0.01\nunits: gal\n{heading}\n{rows}")
+    suite = read_suite(tmp_path, channel=2, implausible="accept")
+    assert suite.labels == ("one",)
+    assert suite.left_out == ("two.csv (UD)",)

@@ -69,7 +69,7 @@ def test_pieces_are_the_wave(name: str) -> None:
 
 
 @each
-def test_pieces_join(name: str) -> None:
+def test_no_phase_of_a_wave_is_left_out_of_its_pieces(name: str) -> None:
     """No phase is left out, and w jumps only where it is said to, upwards, or down."""
     wave = wave_of(EVERY[name])
     assert wave.pieces[0].start == 0.0
@@ -131,11 +131,14 @@ def test_friction_turns_at_each_zero() -> None:
     scale = amplitude * exact(THREE_ZEROS, np.array([1.0]))[0] / (a * np.sin(2.0) + b * np.sin(3.0))
 
     def shaking(phase: np.ndarray) -> np.ndarray:
-        return scale * (a * np.sin(2 * phase) + b * np.sin(3 * phase))
+        ground: np.ndarray = scale * (a * np.sin(2 * phase) + b * np.sin(3 * phase))
+        return ground
 
     def rate(phase: np.ndarray) -> np.ndarray:
         ground = shaking(phase)
-        return np.sign(ground) * g * (mu_s - at_rest * np.exp(-decay * np.abs(ground) / g))
+        friction = at_rest * np.exp(-decay * np.abs(ground) / g)
+        relative: np.ndarray = np.sign(ground) * g * (mu_s - friction)
+        return relative
 
     low = 0.0
     high = 0.1

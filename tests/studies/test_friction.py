@@ -108,6 +108,22 @@ def test_slides_of_stick_slip(stick_slip: xr.Dataset, noise: float) -> None:
     np.testing.assert_allclose(found.slide_peak, crests, atol=0.0026 if noise == 0.0 else 0.04)
 
 
+def test_slides_begin_and_stop_at_the_first_sample_after_the_block_does() -> None:
+    """At 100 Hz, against the simulated motion at 100 kHz."""
+    block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.38, "amplitude": 3.55, "frequency": 1.8}
+    block |= {"yield_acceleration": 0.59, "decay_rate": 2.7, "excitation": slipsweep.Sine(cycles=5)}
+    step = 0.01
+    test = slipsweep.simulate(**block, times=np.arange(0.0, 3.2, step))
+    found = slipsweep.measured_friction(test, 5.0, 0.38)
+    fine = slipsweep.simulate(**block, times=np.arange(0.0, 3.2, 1e-5))
+    moves = np.diff((fine.relative_velocity.values > 0.0).astype(int), append=0)
+    begins, stops = (fine.time.values[moves == sign] for sign in (1, -1))
+    for name, times in (("slide_onset", begins), ("slide_stop", stops)):
+        late = (found[name].values - times) / step
+        assert (late > -0.05).all(), name  # just before the stop r is below the threshold
+        assert (late < 1.0).all(), name
+
+
 @pytest.mark.parametrize("noise", [0.0, 0.02])
 def test_continuous_sliding_is_one_slide(noise: float) -> None:
     found = slipsweep.measured_friction(measured(exact(CONTINUOUS), noise=noise), 6.0, 0.38)

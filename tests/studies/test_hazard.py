@@ -98,7 +98,7 @@ def test_what_lies_outside_is_told() -> None:
         exceedance_rates(curve, [20.0, 30.0], [0.1, 0.2])
 
 
-def test_against_quadrature() -> None:
+def test_rates_are_the_integral_over_straight_lines() -> None:
     """Straight lines of the fragility over a curve with a kink between, by a fine sum."""
     curve = curve_of([0.5, 3.0, 12.0], [0.02, 0.003, 0.00005])
     amplitude = np.array([1.0, 2.0, 6.0, 9.0])
@@ -244,9 +244,120 @@ def test_a_file_of_openquake(tmp_path: Path) -> None:
     assert read_hazard_curve(path, 9.81, site=2).amplitude.size == 5
     with pytest.raises(InputError, match=r"2 sites: give the number of one, site = 1 to 2"):
         read_hazard_curve(path, 9.81)
-    path.write_text(OPENQUAKE.replace("'PGA'", "'SA(0.3)'"))
-    with pytest.raises(InputError, match=r"curves of SA\(0.3\): must be of PGA"):
-        read_hazard_curve(path, 9.81, site=1)
+
+
+@pytest.mark.parametrize(
+    ("imt", "measure"),
+    [
+        ("imt='PGA'", "PGA"),
+        ('imt=""PGA""', "PGA"),
+        ("imt = 'PGA'", "PGA"),
+        ("imt=PGA", "PGA"),
+        ("imt='SA(0.3)'", "SA(0.3)"),
+        ('imt=""SA(1.0)""', "SA(1.0)"),
+        ('imt="SA(1.0)"', "SA(1.0)"),
+        ("imt = 'SA(1.0)'", "SA(1.0)"),
+        ("imt=SA(1.0)", "SA(1.0)"),
+        ("imt='PGV'", "PGV"),
+        ("imt='AvgSA'", "AvgSA"),
+        ("imt=''", None),
+        ("truncation_level=3", None),
+    ],
+)
+def test_the_measure_of_a_file_of_openquake(tmp_path: Path, imt: str, measure: str | None) -> None:
+    """Another measure than PGA is refused whatever its quotes; none wants a word."""
+    path = tmp_path / "hazard.csv"
+    path.write_text(OPENQUAKE.replace("imt='PGA'", imt).replace("time=50.0", "time = 50.0"))
+    if measure == "PGA":
+        assert read_hazard_curve(path, 9.81, site=2).amplitude.size == 5
+        return
+    for word in ("refuse", "accept"):
+        if measure is None and word == "accept":
+            assert read_hazard_curve(path, 9.81, site=2, unstated="accept").amplitude.size == 5
+            continue
+        with pytest.raises(InputError) as refused:
+            read_hazard_curve(path, 9.81, site=2, unstated=word)
+        said = "no imt in its first line: " if measure is None else f"curves of {measure}: must be"
+        assert said in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "heading",
+    [
+        "PGA (g), annual rate",
+        "PGA (g), rate (1/yr)",
+        "Peak ground acceleration (g), annual frequency of exceedance",
+        "peak acceleration (g), MAFE",
+        "PGA_(g), annual_rate",
+        "# PGA on rock\nacceleration (g), annual rate",
+        "# site on soil, USA\nGround motion (g), PGA (g), annual rate",
+        "PGA (g), SA(1.0) (g), annual rate",
+    ],
+)
+def test_headings_of_curves_of_pga_and_annual_rates(tmp_path: Path, heading: str) -> None:
+    path = tmp_path / "hazard.csv"
+    values = ["0.1, 0.01", "0.4, 0.0005"]
+    if heading.count(",") - heading.count(", USA") > 1:
+        values = [f"{one.split(',')[0]}, {one}" for one in values]
+    path.write_text("\n".join((heading, *values)))
+    curve = read_hazard_curve(path, 10.0)
+    np.testing.assert_allclose(curve.amplitude, [1.0, 4.0], rtol=1e-15)
+    assert curve.rate.tolist() == [0.01, 0.0005]
+
+
+@pytest.mark.parametrize(
+    ("heading", "message"),
+    [
+        ("spectral acceleration (g), annual rate", "'spectral acceleration (g)': must be of PGA"),
+        ("SA(1.0) (g), annual rate", "'SA(1.0) (g)': must be of PGA"),
+        ("Sa [g], annual rate", "'Sa [g]': must be of PGA"),
+        ("PSA_1s (g), annual rate", "'PSA_1s (g)': must be of PGA"),
+        ("acceleration at 1 s (g), annual rate", "must be of PGA"),
+        ("PGV (cm/s), annual rate", "must be of PGA"),
+        ("# SA(1.0), 5 %\nacceleration (g), annual rate", "its comment says 'SA(1.0), 5 %'"),
+        ("# Spectral acceleration\nPGA (g), annual rate", "its comment says 'Spectral acc"),
+        ("PGA (g), exceedance in 50 years", "'exceedance in 50 years': must be an annual rate"),
+        ("PGA (g), PoE in 50 yr", "must be an annual rate"),
+        ("PGA (g), 10% in 50 years", "must be an annual rate"),
+        ("PGA (g), annual rate (1/50yr)", "must be an annual rate"),
+        ("PGA (g), return period (yr)", "must be an annual rate"),
+        ("# exceedance in 50 years\nPGA (g), rate", "its comment says 'exceedance in 50 years'"),
+    ],
+)
+def test_headings_that_say_something_else_are_refused(
+    tmp_path: Path, heading: str, message: str
+) -> None:
+    path = tmp_path / "hazard.csv"
+    path.write_text(f"{heading}\n0.1, 0.01\n0.4, 0.0005\n")
+    for word in ("refuse", "accept"):
+        with pytest.raises(InputError) as refused:
+            read_hazard_curve(path, 10.0, unstated=word)
+        assert message in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("heading", "message"),
+    [
+        ("acceleration (g), annual rate", "column 'acceleration (g)': does not say that it is PGA"),
+        ("amplitude (g), annual rate", "does not say that it is PGA"),
+        ("iml (g), annual rate", "does not say that it is PGA"),
+        ("PGA (g), rate", "column 'rate': does not say that its rates are annual"),
+        ("PGA (g), exceedance", "does not say that its rates are annual"),
+        ("PGA (g), frequency", "does not say that its rates are annual"),
+    ],
+)
+def test_what_a_heading_leaves_open_is_accepted_by_a_word(
+    tmp_path: Path, heading: str, message: str
+) -> None:
+    path = tmp_path / "hazard.csv"
+    path.write_text(f"{heading}\n0.1, 0.01\n0.4, 0.0005\n")
+    with pytest.raises(
+        InputError, match="--unstated accept takes it for a curve of PGA"
+    ) as refused:
+        read_hazard_curve(path, 10.0)
+    assert message in str(refused.value)
+    curve = read_hazard_curve(path, 10.0, unstated="accept")
+    np.testing.assert_allclose(curve.amplitude, [1.0, 4.0], rtol=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -275,7 +386,7 @@ def test_curves_that_are_refused(tmp_path: Path, text: str, message: str) -> Non
     assert str(path) in str(refused.value)
 
 
-def test_the_command(tmp_path: Path) -> None:
+def test_hazard_prints_rates_and_what_is_not_known_of_them(tmp_path: Path) -> None:
     """It prints the rates that the function gives, draws them, and says what to do about what is not known."""
     rng = np.random.default_rng(3)
     amplitude = np.geomspace(0.5, 10.0, 6)
@@ -315,6 +426,20 @@ def test_the_command(tmp_path: Path) -> None:
     cut = command(tmp_path, *run, "--at", "mu_s=0.4", "-o", "c.png")
     assert (cut.returncode, cut.stdout.count("mu_s = 0.4\n")) == (0, 1)
     assert f"{found.annual_rate.values[1, 0]:.4g}" in cut.stdout
+
+
+def test_the_command_takes_what_a_curve_leaves_open(tmp_path: Path) -> None:
+    u = np.array([[0.0, 0.1], [0.1, 0.2], [0.3, 0.4]])
+    result = suite_result(u, np.zeros_like(u), ("amplitude", "motion"))
+    write(tmp_path, result.assign_coords(amplitude=[5.0, 10.0, 20.0]))
+    run = ("hazard", "a.nc", "--curve", "hazard.csv", "-d", "5cm")
+    expected = command(tmp_path, *run)
+    (tmp_path / "hazard.csv").write_text(CURVE.replace("PGA", "level").replace("annual", ""))
+    refused = command(tmp_path, *run)
+    assert (refused.returncode, refused.stderr.count("\n")) == (2, 1)
+    assert "does not say that it is PGA" in refused.stderr
+    done = command(tmp_path, *run, "--unstated", "accept")
+    assert (done.returncode, done.stdout) == (0, expected.stdout)
 
 
 def test_the_end_of_the_curve_is_told_from_the_end_of_the_sweep(tmp_path: Path) -> None:

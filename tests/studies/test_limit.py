@@ -14,7 +14,7 @@ from slipsweep import InputError, Mendez, Record, SlidingMode, Validity, limit_a
 from slipsweep.model.variables import RECORD_COUNTS, LimitStatus
 from tests.support.cases import choices
 from tests.support.commands import command
-from tests.support.made_up_records import made
+from tests.support.made_up_records import few_pulses, made
 
 
 def sweep_at(amplitude: xr.DataArray, inputs: dict[str, Any], **options: Any) -> xr.DataArray:
@@ -22,7 +22,7 @@ def sweep_at(amplitude: xr.DataArray, inputs: dict[str, Any], **options: Any) ->
         name: xr.DataArray(values, dims=name) if np.ndim(values) else values
         for name, values in inputs.items()
     }
-    return sweep(
+    result = sweep(
         **choices(
             amplitude=amplitude.fillna(0.0),
             **given,
@@ -30,7 +30,8 @@ def sweep_at(amplitude: xr.DataArray, inputs: dict[str, Any], **options: Any) ->
             variables=["permanent_displacement"],
             **options,
         )
-    ).permanent_displacement
+    )
+    return result["permanent_displacement"]
 
 
 @pytest.mark.parametrize(
@@ -89,7 +90,7 @@ def test_newmark_closed_form() -> None:
             amplitude * (slid * math.cos(start) - math.sin(stop) + math.sin(start))
             - yielded * slid * slid / 2
         )
-        return travel / omega**2
+        return float(travel) / omega**2
 
     for target in (1e-4, 0.004, 0.02):
         expected = brentq(
@@ -258,7 +259,7 @@ def test_zipped_inputs_and_slabs(monkeypatch: pytest.MonkeyPatch) -> None:
         ({"model": "jibson"}, "model = 'jibson'"),
     ],
 )
-def test_refusals(given: dict[str, Any], message: str) -> None:
+def test_limits_of_impossible_inputs_are_refused(given: dict[str, Any], message: str) -> None:
     asked: dict[str, Any] = {
         "displacement": 0.05,
         "theta": 5,
@@ -273,10 +274,7 @@ def test_refusals(given: dict[str, Any], message: str) -> None:
 
 @pytest.fixture(scope="module")
 def shaking() -> Record:
-    """Some pulses of different sizes and both signs."""
-    times = np.arange(0.0, 8.0, 0.02)
-    wave = np.sin(2 * np.pi * 1.1 * times) + 0.7 * np.sin(2 * np.pi * 2.7 * times + 1.0)
-    return Record(times, wave * times**2 * np.exp(-1.2 * times))
+    return few_pulses()
 
 
 def case_of(seed: int) -> dict[str, Any]:
@@ -375,6 +373,18 @@ def test_no_limit_and_what_is_refused(shaking: Record) -> None:
         limit_amplitude(0.1, 5.0, 0.4)
     with pytest.raises(InputError, match="has no acceleration to scale"):
         limit_amplitude(0.1, 5.0, 0.4, excitation=Record.sampled([0.0, 0.0, 0.0], 0.1))
+
+
+def test_the_search_ends_at_five_g_of_the_models_gravity() -> None:
+    """A limit between 3 and 5 g is found, one above 5 g is not reached."""
+    for g in (9.81, 1.62):
+        given: dict[str, Any] = {"frequency": 0.5, "model": slipsweep.Newmark(g=g)}
+        found = limit_amplitude(0.01, yield_coefficient=[3.5, 4.999], amplitude_steps=16, **given)
+        assert found.attrs["maximum_amplitude"] == pytest.approx(5.0 * g, rel=1e-15)
+        np.testing.assert_array_equal(
+            found.limit_status, [LimitStatus.REACHED, LimitStatus.NOT_REACHED]
+        )
+        assert 3.5 * g < found.limit_amplitude[0] < 5.0 * g
 
 
 SWEEP = """

@@ -9,6 +9,7 @@ import xarray as xr
 from slipsweep import InputError, Record, Suite, sample, sweep
 from slipsweep.model.variables import Validity
 from tests.studies.test_uncertainty import assert_statistics, sampling_of
+from tests.support.made_up_records import few_pulses
 
 SAMPLES = 64
 THRESHOLDS = (0.001, 0.02)
@@ -16,11 +17,8 @@ THRESHOLDS = (0.001, 0.02)
 
 @pytest.fixture(scope="module")
 def shaking() -> Record:
-    """Some pulses of different sizes and both signs."""
-    times = np.arange(0.0, 8.0, 0.02)
-    wave = np.sin(2 * np.pi * 1.1 * times) + 0.7 * np.sin(2 * np.pi * 2.7 * times + 1.0)
-    wave *= times**2 * np.exp(-1.2 * times)
-    return Record(times, 2.0 * wave / np.abs(wave).max())
+    record = few_pulses()
+    return Record(record.times, 2.0 * record.acceleration / record.peak)
 
 
 def drawn(uncertain: dict[str, Any]) -> dict[str, xr.DataArray]:
@@ -122,7 +120,7 @@ def test_statistics_are_those_of_the_draws(shaking: Record, name: str) -> None:
         ),
     ],
 )
-def test_refusals(
+def test_samples_under_a_record_that_are_refused(
     shaking: Record, given: dict[str, Any], uncertain: dict[str, Any], message: str
 ) -> None:
     block: dict[str, Any] = {"theta": 5.0, **({} if "mu_s" in uncertain else {"mu_s": 0.4})}

@@ -199,7 +199,7 @@ def test_where_there_are_no_indices_the_status_says_why() -> None:
         ),
     ],
 )
-def test_what_is_refused(options: dict[str, Any], message: str) -> None:
+def test_indices_that_cannot_be_computed_are_refused(options: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         sampling_of(ANGLES, **{"sensitivity": True, **options})
 

@@ -7,7 +7,8 @@ import pytest
 import xarray as xr
 
 from slipsweep import InputError, Record, Suite, Validity, suite_statistics, sweep
-from slipsweep.studies.suite_statistics import REASONS
+from slipsweep.model.variables import LimitStatus
+from slipsweep.studies.suite_statistics import REASONS, limit_quantiles
 
 UNSTABLE = Validity.STATICALLY_UNSTABLE
 UPLIFT = Validity.UPLIFT
@@ -34,7 +35,7 @@ def suite_result(displacement: Any, validity: Any, dims: tuple[str, ...]) -> xr.
     return xr.Dataset(data, coords, {"g": 9.81, "suite": "made up"})
 
 
-def test_by_hand() -> None:
+def test_zeros_missing_values_and_rounding_in_statistics_by_hand() -> None:
     """Rows: some zeros; all zeros; no values; one value; one non-zero value."""
     nan = np.nan
     values = [
@@ -84,7 +85,7 @@ def test_by_hand() -> None:
 
 
 @pytest.mark.parametrize("over", [None, "motion", ["motion", "polarity", "theta"]])
-def test_beside_numpy(over: Any) -> None:
+def test_statistics_are_numpys_of_each_grid_point(over: Any) -> None:
     """Random displacements, a third zero and a fifth missing; polarity is part of the suite unless told otherwise."""
     rng = np.random.default_rng(11)
     dims = ("theta", "polarity", "mu_s", "motion")
@@ -123,7 +124,7 @@ def test_beside_numpy(over: Any) -> None:
     )
 
 
-def test_of_a_sweep() -> None:
+def test_statistics_of_a_sweep_count_steep_and_flat_slopes() -> None:
     """A steep slope has no value, a flat one does not slide; what xarray computes is the same."""
     motions = [
         Record.sampled(np.random.default_rng(i).normal(size=200) * np.hanning(200), 0.02, f"n{i}")
@@ -161,7 +162,33 @@ def test_of_a_sweep() -> None:
         ({"zero": "2 s"}, 'zero = "2 s": must be a number, with a unit that converts to m'),
     ],
 )
-def test_what_is_refused(given: dict[str, Any], message: str) -> None:
+def test_statistics_of_no_suite_are_refused(given: dict[str, Any], message: str) -> None:
     result = suite_result([[0.1, 0.2]], [[0, 0]], ("mu_s", "motion"))
     with pytest.raises(InputError, match=message):
         suite_statistics(result, **given)
+
+
+def test_limits_of_motions_without_a_value_are_left_out_of_their_quantiles() -> None:
+    """Those that are not reached are above all others; without a value at any amplitude there is no limit."""
+    nan = np.nan
+    reached, beyond, invalid = LimitStatus.REACHED, LimitStatus.NOT_REACHED, LimitStatus.INVALID
+    values = [[1.0, 2.0, 3.0, nan, nan], [1.0, nan, nan, nan, nan], [nan, nan, nan, nan, nan]]
+    status = [
+        [reached, LimitStatus.AT_JUMP, LimitStatus.AFTER_GAP, beyond, invalid],
+        [reached, beyond, beyond, invalid, invalid],
+        [invalid] * 5,
+    ]
+    limits = xr.Dataset(
+        {
+            "limit_amplitude": (("mu_s", "motion"), values),
+            "limit_status": (("mu_s", "motion"), np.array(status, np.int8)),
+        }
+    )
+    found = limit_quantiles(limits)
+    np.testing.assert_array_equal(found["quantile"], [0.16, 0.5, 0.84])
+    # of 1, 2, 3 and one above: between the third and the fourth there is no number
+    expected = [[1.48, 2.5, np.inf], [np.inf] * 3, [nan] * 3]
+    np.testing.assert_allclose(found.limit_quantile.transpose("mu_s", "quantile"), expected)
+    np.testing.assert_array_equal(found.value_count, [4, 3, 0])
+    np.testing.assert_array_equal(found.not_reached_count, [1, 2, 0])
+    assert found.limit_quantile.attrs["units"] == "m s-2"

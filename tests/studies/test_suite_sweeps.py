@@ -16,6 +16,7 @@ from slipsweep.files.opening import read_result
 from slipsweep.model.variables import DEFAULT_RECORD_RESULTS, MOTION_COORDINATES
 from tests.studies.test_record_sweeps import assert_same_data, run
 from tests.support.commands import command
+from tests.support.made_up_records import write_motion
 
 SWEEP = """
 [excitation]
@@ -42,12 +43,6 @@ time_scale.values = [1, 2]
 samples = 32
 mu_s = { distribution = "uniform", loc = 0.1, scale = 0.2 }
 """
-
-
-def write_motion(path: Path, seed: int, count: int, interval: float) -> None:
-    values = 0.3 * np.random.default_rng(seed).normal(size=count) * np.hanning(count)
-    rows = (f"{at * interval:.6g},{value:.6g}\n" for at, value in enumerate(values))
-    path.write_text("time,acceleration\n" + "".join(rows))
 
 
 @pytest.fixture

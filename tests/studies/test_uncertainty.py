@@ -258,6 +258,23 @@ def test_factor_on_an_estimate(name: str) -> None:
     assert not np.allclose(plain.mean_displacement, found.mean_displacement, rtol=1e-3)
 
 
+@pytest.mark.parametrize("name", ["decay_rate", "delta_mu", "minimum_friction"])
+def test_a_factor_on_an_estimate_that_fails_has_no_value(name: str) -> None:
+    """λ by Eq. 6 is negative: the block has a flag and no displacement, not 0, whatever is drawn about it."""
+    block: dict[str, Any] = {"theta": 0.0, "mu_s": 1.5, "amplitude": 14.0}
+    block["yield_acceleration"] = 1.0
+    estimate = slipsweep.friction_parameters(**block)
+    assert estimate.decay_rate < 0.0
+    about = {"distribution": "uniform", "loc": 0.9, "scale": 0.2, "kind": "factor"}
+    found = slipsweep.sample(**block, frequency=1.0, uncertain={name: about}, samples=64)
+    assert found.valueless_share == 1.0
+    assert found.flag_share.sel(flag=slipsweep.Validity.FRICTION_NOT_DECAYING) == 1.0
+    assert found.mode_share.sum() == 0.0
+    assert found.mean_displacement.isnull()
+    assert found.displacement_quantile.isnull().all()
+    assert found.exceedance_probability.isnull().all()
+
+
 def test_correlation_of_normal_scores() -> None:
     uncertain = {
         "mu_s": {**LOGNORMAL, "scale": 0.4},
@@ -277,6 +294,30 @@ def test_correlation_of_normal_scores() -> None:
             np.quantile(free[name], [0.1, 0.5, 0.9]),
             rtol=0.01,
         )
+
+
+def test_samples_that_lose_contact_are_no_part_of_a_probability() -> None:
+    """Unlike statically unstable ones: P(u > d) = (above + unstable) / (with a value + unstable)."""
+    uncertain = {
+        "mu_s": {"distribution": "uniform", "loc": 0.3, "scale": 0.4},
+        "amplitude": {"distribution": "uniform", "loc": 2.0, "scale": 24.0},
+    }
+    found = slipsweep.sample(
+        25.0, frequency=1.0, uncertain=uncertain, samples=256, thresholds=[0.05, 0.5]
+    )
+    draws: dict[str, Any] = {
+        name: xr.DataArray(values, dims="draw")
+        for name, values in drawn(uncertain, samples=256).items()
+    }
+    swept = slipsweep.sweep(25.0, frequency=1.0, **draws)
+    flags = slipsweep.flags(swept)
+    unstable = int(flags.statically_unstable.sum())
+    valued = int(swept.permanent_displacement.notnull().sum())
+    assert min(unstable, valued, 256 - unstable - valued) > 20
+    for threshold in (0.05, 0.5):
+        above = int((swept.permanent_displacement > threshold).sum())
+        probability = found.exceedance_probability.sel(threshold=threshold)
+        assert probability == pytest.approx((above + unstable) / (valued + unstable), rel=1e-14)
 
 
 def test_statically_unstable_samples_exceed_every_threshold() -> None:

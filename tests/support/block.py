@@ -79,8 +79,7 @@ class NoValueError(Exception):
 class Block:
     """The state of the block, and the motion rules of one section of the shaking after the other."""
 
-    def __init__(self, model: str, rise: str, recoupling: str, recorded: bool = False) -> None:
-        self.recorded = recorded
+    def __init__(self, model: str, rise: str, recoupling: str) -> None:
         self.newmark = model == "newmark"
         self.literal = rise == "literal" and not self.newmark
         self.integrate = recoupling == "integrate" or self.newmark
@@ -198,15 +197,16 @@ class Block:
             return
         if section.side > 0 and jumps_up:
             self.meet(section.first, section.first)
-        if self.sliding and self.reset and not self.integrate:
+        if self.sliding and self.reset:
             self.check()
+        if self.sliding and self.reset and not self.integrate:
             self.brake(section.end - section.start)
         elif self.sliding:
-            self.check()
             self.hold(section, section.start, section.end)
 
     def check(self) -> None:
-        if self.b <= 0 and not self.recorded:
+        """From t5 on Eq. 12 needs b > 0."""
+        if self.b <= 0:
             raise NoValueError
 
     def rise(self, section: Section) -> None:
@@ -222,8 +222,11 @@ class Block:
             self.meet(section.ground(a), section.ground((a + b) / 2))
             while self.sliding and a < b:
                 a = self.slide(section, a, b)
-                if not self.sliding and a < b:
+                if self.rests() and a < b:
                     self.begin(section.ground(a), section.ground((a + b) / 2))
+
+    def rests(self) -> bool:
+        return not self.sliding
 
     def meet(self, x: mpfr, beyond: mpfr) -> None:
         """What happens as the base comes to x, not falling, on its way to `beyond`."""

@@ -19,7 +19,8 @@ def workdps(digits: int) -> Iterator[None]:
 
 def decimals() -> int:
     """The digits computed with."""
-    return round(gmpy2.get_context().precision / _BITS_A_DIGIT) - 1
+    bits: int = gmpy2.get_context().precision
+    return round(bits / _BITS_A_DIGIT) - 1
 
 
 def epsilon() -> mpfr:

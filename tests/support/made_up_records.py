@@ -1,11 +1,13 @@
-"""Records of a few dozen samples in which much happens: plateaus, zeros touched, peaks of one height.
+"""Made-up records: noise, pulses, and some of a few dozen samples in which much happens.
 
+The last have plateaus, zeros that are touched, and peaks of one height.
 `tests/kernels/test_record.py` holds the solver to the reference on some, ``python -m
 benchmarks.agreement`` on many.
 """
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,31 @@ from slipsweep import Record, sweep
 from slipsweep.model.variables import VALUELESS
 from tests.support.cases import choices
 from tests.support.reference import solve_record
+
+
+def band_noise() -> Record:
+    """Noise with a band and an envelope of earthquakes: pulses of all sizes, several maxima each."""
+    rng = np.random.default_rng(7)
+    times = np.arange(0.0, 20.0, 0.01)
+    phases = rng.uniform(0, 2 * np.pi, 60)
+    bands = np.sin(2 * np.pi * np.linspace(0.3, 9.0, 60)[:, None] * times + phases[:, None]).sum(0)
+    wave = bands * (times / 4) ** 2 * np.exp(-times / 2.5)
+    return Record(times, 6.0 * wave / np.abs(wave).max())
+
+
+def few_pulses() -> Record:
+    """Some pulses of different sizes and both signs."""
+    times = np.arange(0.0, 8.0, 0.02)
+    wave = np.sin(2 * np.pi * 1.1 * times) + 0.7 * np.sin(2 * np.pi * 2.7 * times + 1.0)
+    return Record(times, wave * times**2 * np.exp(-1.2 * times))
+
+
+def write_motion(path: Path, seed: int, count: int, interval: float) -> None:
+    """Write noise under a window as a file of times and accelerations, without units."""
+    values = 0.3 * np.random.default_rng(seed).normal(size=count) * np.hanning(count)
+    rows = (f"{at * interval:.6g},{value:.6g}\n" for at, value in enumerate(values))
+    path.write_text("time,acceleration\n" + "".join(rows))
+
 
 #: Accelerations that meet each other.
 LEVELS = (0.0, 0.0, 0.53, 1.03, 2.07, 3.1, 4.1, 5.03, 6.55)

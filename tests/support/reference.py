@@ -67,7 +67,8 @@ class Solution:
 
     ``recoupled`` is true where every pulse of stick-slip (or stuck) comes to rest before the
     next onset; it is false in continuous mode.  ``eq4_below_yield`` is bit 16 of ``validity``,
-    but for Newmark's block, where it is true and the bit is not set.
+    but for the literal rise, whose b follows Eq. 4 below Uy, and for Newmark's block, where it is
+    true: they have no such bit.
     """
 
     permanent_displacement: mpfr
@@ -139,18 +140,20 @@ def friction_parameters(
         return FrictionParameters(onset, limit, ratio, least, excess, rate, mode, validity)
 
 
-def _remarks(ratio: mpfr, upslope: bool, below: bool, model: str, given: dict[str, Any]) -> int:
+def _remarks(ratio: mpfr, upslope: bool, governs: bool, model: str, given: dict[str, Any]) -> int:
     """Bits of a block that slides and has a value: upslope, near the mode limit, friction estimated."""
     if model == "newmark":
         return UPSLOPE * upslope
     estimated = given.get("decay_rate") is None or given.get("delta_mu") is None
     near = bool(0.9 <= ratio <= 1.1)
     return (
-        UPSLOPE * upslope | NEAR_MODE_LIMIT * near | FRICTION_ESTIMATED * (estimated and not below)
+        UPSLOPE * upslope
+        | NEAR_MODE_LIMIT * near
+        | FRICTION_ESTIMATED * (estimated and not governs)
     )
 
 
-def _yield_governs(block: Block, rises: Iterable[tuple[mpfr, mpfr]]) -> bool:
+def _eq4_below_yield(block: Block, rises: Iterable[tuple[mpfr, mpfr]]) -> bool:
     """Whether Üg exceeds Uy, and Eq. 4 stays below it at all that the base rises through."""
     interface = block.interface
     values = [
@@ -271,26 +274,21 @@ def solve(
         try:
             shaking = _cycles(block, wave, peak, mode == CONTINUOUS)
             if mode == STICK_SLIP:
-                below = _yield_governs(block, _rises(shaking, block.rounding))
+                below = _eq4_below_yield(block, _rises(shaking, block.rounding))
                 block.run_out()
         except NoValueError:
             shaking = [section for n in range(cycles) for section in wave.sections(n, peak)]
-            below = _yield_governs(block, _rises(shaking, block.rounding))
+            below = _eq4_below_yield(block, _rises(shaking, block.rounding))
             return Solution(
-                gmpy2.nan(),
-                gmpy2.nan(),
-                MISSING,
-                validity | KD_NOT_POSITIVE | YIELD_GOVERNS * below,
-                False,
-                below,
+                gmpy2.nan(), gmpy2.nan(), MISSING, validity | KD_NOT_POSITIVE, False, below
             )
-        validity |= (
-            YIELD_GOVERNS * (below and not block.newmark) | NOT_RECOUPLED * block.recoupled_late
-        )
+        governs = below and not block.newmark and not block.literal
+        validity |= YIELD_GOVERNS * governs
+        validity |= NOT_RECOUPLED * (block.recoupled_late and not block.newmark)
         if any(max(section.first, section.last) > block.onset for section in shaking):
             # ramps may keep the shaking below its peak, and the block from sliding
             validity |= _remarks(
-                parameters.acceleration_ratio, block.u < -block.rounding, below, model, given
+                parameters.acceleration_ratio, block.u < -block.rounding, governs, model, given
             )
         omega = 2 * gmpy2.const_pi() * mpfr(frequency)
         recoupled = mode == STICK_SLIP and not block.recoupled_late
@@ -356,7 +354,7 @@ def solve_record(
     with workdps(dps + GUARD_DIGITS):
         values = [mpfr(scale) * mpfr(float(a)) for a in acceleration]
         sections = sections_of_record(times, values)
-        block = Block(model, rise, recoupling, True)
+        block = Block(model, rise, recoupling)
         tan_theta = gmpy2.tan(gmpy2.radians(mpfr(theta)))
 
         def friction(peak: mpfr) -> FrictionParameters:
@@ -388,17 +386,15 @@ def solve_record(
             modes.append(mode)
             pulse = sections[begin:end]
             after = sections[end:following]
-            below = mode == STICK_SLIP and _yield_governs(block, [(onset, peak)])
-            validity |= YIELD_GOVERNS * (below and not block.newmark)
-            validity |= _remarks(parameters.acceleration_ratio, False, below, model, given)
+            monotone = mode == STICK_SLIP and not block.literal and not block.newmark
+            governs = monotone and _eq4_below_yield(block, [(onset, peak)])
+            validity |= YIELD_GOVERNS * governs
+            validity |= _remarks(parameters.acceleration_ratio, False, governs, model, given)
             if mode == CONTINUOUS:
                 _slide(block, pulse, after, following < len(sections), peak)
                 continue
             _stick_and_slip(block, pulse)
-            # there is a value if b > 0 at the end of the last rise
-            if (block.sliding and block.b <= 0) or (
-                block.literal and block.interface.eq4(peak) <= 0
-            ):
+            if block.sliding and block.b <= 0:
                 return RecordSolution(
                     gmpy2.nan(), gmpy2.nan(), -1, -1, -1, validity | KD_NOT_POSITIVE
                 )
@@ -428,8 +424,6 @@ def _slide(
     bottom = 0
     while bottom < len(after) and after[bottom].side < 0:
         bottom += 1
-        if bottom < len(after) and after[bottom].first == 0:
-            break
     way_up = after[bottom:]
     at_once = another and all(
         one.first >= 0 and one.last > 0 and (i == 0 or one.first > 0)

@@ -51,7 +51,11 @@ class SlipsweepAccessor:
         show_cautions: bool = False,
         width: float | str | None = None,
         grey: bool = False,
+        title: str | None = None,
+        caption: Literal["full", "short"] | None = None,
         ax: "Axes | None" = None,
+        equations: Sequence[str] | str = (),
+        magnitude: float | None = None,
     ) -> "Figure | Axes":
         """Draw a chart, as `slipsweep chart` does.
 
@@ -90,8 +94,18 @@ class SlipsweepAccessor:
             smaller.
         grey : bool
             Draw without colour.
+        title : str, optional
+            A title of your own.
+        caption : {"full", "short"}, optional
+            In full, or without the options of the model, the equations of the estimates, the ratio
+            to Newmark's block and the version; by default short where the width is below 127 mm.
         ax : matplotlib.axes.Axes, optional
             Axes to draw a chart of one panel in, with its legend and caption.
+        equations : sequence of str or str
+            Published equations to draw beside, of `slipsweep.published.EQUATIONS`; with "curve",
+            "motions", "intensity" and "dimensionless".
+        magnitude : float, optional
+            Moment magnitude M, for the equations that need it.
 
         Returns
         -------
@@ -126,6 +140,10 @@ class SlipsweepAccessor:
             show_cautions=show_cautions,
             width=width,
             grey=grey,
+            title=title,
+            caption=caption,
             ax=ax,
+            equations=equations,
+            magnitude=magnitude,
         )
         return figure if ax is None else ax

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from slipsweep.charts import solved, style
+from slipsweep.charts import equations, solved, style
 from slipsweep.charts.sheet import Panel, Sheet, curve_looks, log_axis, log_ticks, plot_curve
 from slipsweep.charts.slices import Result
 from slipsweep.charts.style import Look
@@ -123,8 +123,10 @@ def _drawn(sheet: Sheet, name: str, scaled: bool = False) -> Figure:
                 xscale="log", xlim=(1.0, None), xlabel="peak ground acceleration over yield, A / Üy"
             )
             log_ticks(panel.axes.xaxis, 10)
+            equations.draw_normalised(sheet, panel)
         else:
             _mark_accelerations(sheet, panel)
+            equations.draw_over_axis(sheet, panel)
     sheet.note_left_out(name)
     return sheet.done()
 
@@ -172,7 +174,7 @@ def spread(result: Result, options: style.Options) -> Figure:
         _underlay(sheet, panel)
         _mark_accelerations(sheet, panel)
     sheet.note_left_out(solved.DISPLACEMENT, *flags)
-    sheet.notes.append(
+    sheet.note(
         "All results have the same Üy; λ = 2 to 3 is what the paper measured on its interface."
     )
     return sheet.done()
@@ -180,7 +182,9 @@ def spread(result: Result, options: style.Options) -> Figure:
 
 def _alternatives(own: Model) -> Iterator[tuple[str, Model, dict[str, Any], Look]]:
     """What may be computed in place of a result: its name in the legend, model, changed parameters, and look."""
-    yield style.NEWMARK, Newmark(g=own.g), {}, {"color": "0.35", "linestyle": "-", "marker": "x"}
+    if isinstance(own, Mendez):
+        look: Look = {"color": "0.35", "linestyle": "-", "marker": "x"}
+        yield style.NEWMARK, Newmark(g=own.g), {}, look
     ours = own if isinstance(own, Mendez) else Mendez(g=own.g)
     for (recoupling, (end, colours)), (decay, (changed, dash)) in itertools.product(
         _ENDS.items(), _DECAYS.items()
@@ -254,8 +258,8 @@ def _underlay(sheet: Sheet, panel: Panel) -> None:
     drawn = panel.data["drawn"]
     flagged = (drawn > 0) & solved.has_flags(panel.data["validity"], CAUTIONS)
     seen = sheet.data["validity"].where(sheet.data["drawn"] > 0)
-    names = [style.flag_name(flag) for flag in CAUTIONS if solved.has_flags(seen, flag).any()]
-    marks = [("caution", "caution:\n" + "\n".join(names), _CAUTION, flagged)]
+    words = [style.FLAG_TEXT[flag] for flag in CAUTIONS if solved.has_flags(seen, flag).any()]
+    marks = [("caution", "\n".join(words), _CAUTION, flagged)]
     if "unsound" in panel.data:
         text = style.UNSOUND if "newmark" in panel.data else "falls with A"
         marks.append(("unsound", text, _UNSOUND, panel.data["unsound"]))

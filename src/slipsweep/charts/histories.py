@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 from slipsweep.charts import style
 from slipsweep.charts.sheet import Drawing
 from slipsweep.charts.slices import Result
-from slipsweep.charts.solved import thresholds
+from slipsweep.charts.solved import slides_back_text, thresholds
 from slipsweep.charts.style import BLUE, VERMILION, Look, Options
 from slipsweep.model.variables import SlidingMode
 
@@ -97,6 +97,8 @@ def history(result: Result, options: Options) -> Figure:
         "relative\nvelocity (m/s)",
         f"relative\ndisplacement ({unit})",
     ]
+    if slides_back := slides_back_text(data):
+        drawing.note(f"Here {slides_back}.", "Would also slide upslope: displacement too large.")
     return _finish(drawing, labels, [style.caption(data, options)])
 
 

@@ -11,13 +11,24 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from slipsweep._version import __version__
-from slipsweep.charts import curves, histories, limits, maps, solved, statistics, style, suites
+from slipsweep.charts import (
+    curves,
+    equations,
+    histories,
+    limits,
+    maps,
+    solved,
+    statistics,
+    style,
+    suites,
+)
 from slipsweep.charts.slices import Result
 from slipsweep.charts.style import Options
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.opening import values_text
 from slipsweep.files.selection import At, own_names
-from slipsweep.model.variables import PARAMETERS, REFERENCE
+from slipsweep.model.options import MODELS
+from slipsweep.model.variables import PARAMETERS, Validity
 
 Draw = Callable[[Result, Options], Figure]
 
@@ -53,6 +64,10 @@ SORTS: dict[str, tuple[str, tuple[Draw, ...]]] = {
 }
 
 
+#: Flags that charts hatch and Newmark's block can raise.
+_NEWMARK_FLAGS = (Validity.STATICALLY_UNSTABLE, Validity.FLEXIBLE_BLOCK)
+
+
 def kinds_of(sort: str) -> dict[str, Draw]:
     """The kinds of charts of a sort of result, in order."""
     return {function.__name__: function for function in SORTS[sort][1]}
@@ -68,7 +83,10 @@ def check_kind(kind: str) -> str:
 
 def fitting(result: Result, options: Options) -> list[str]:
     """The kinds that are drawn of a result if none is named; with one axis left, its curve."""
+    result.check_axes()
     kinds = kinds_of(result.sort)
+    if options.equations and (drawn := [kind for kind in kinds if kind in equations.KINDS]):
+        return drawn
     if result.sort != "sweep":
         return [
             kind for kind in kinds if kind != "sensitivity" or "total_index" in result.variables
@@ -96,9 +114,15 @@ def draw(result: Result, kind: str | None, options: Options) -> Figure:
         raise InputError(
             f"{result.name}: --kind {kind}: is {SORTS[result.sort][0]}: must be {allowed}"
         )
+    if options.equations and (
+        kind not in equations.KINDS or options.variable != solved.DISPLACEMENT
+    ):
+        drawn = f"--kind {', '.join(equations.KINDS)}, of {solved.DISPLACEMENT}"
+        raise InputError(f"{result.name}: --equations: not with --kind {kind}: only with {drawn}")
     for name in ("at", "x", "y", "panels", "levels"):
         if getattr(options, name) and not result.dims:
             raise InputError(f"{result.name}: --{name}: not with {kind}, which is drawn as a whole")
+    result.check_axes()
     with mpl.rc_context({"font.size": options.font}):
         try:
             return kinds[kind](result, options)
@@ -139,7 +163,7 @@ def draw_all(
 
 def save(figure: Figure, path: Path, ending: str) -> None:
     """Write a figure in the format of an ending."""
-    content = io.BytesIO()  # matplotlib's writers leave a traceback on a full disk
+    content = io.BytesIO()  # to memory: matplotlib leaves a traceback where a disk is full
     figure.savefig(content, format=ending[1:], dpi=150)
     path.write_bytes(content.getvalue())
 
@@ -148,11 +172,12 @@ def write_book(path: Path, result: Result, figures: Iterable[Figure]) -> None:
     """Write a title page and some charts as pages of one PDF."""
     from matplotlib.backends.backend_pdf import PdfPages  # here: other charts do without it
 
-    with PdfPages(
-        path, metadata={"Title": str(result.attrs.get("title", "")), "Creator": "slipsweep"}
-    ) as pages:
+    content = io.BytesIO()  # as in `save`
+    about = {"Title": str(result.attrs.get("title", "")), "Creator": "slipsweep"}
+    with PdfPages(content, metadata=about) as pages:
         for figure in (title_page(result), *figures):
             pages.savefig(figure)
+    path.write_bytes(content.getvalue())
 
 
 def title_page(result: Result) -> Figure:
@@ -168,6 +193,7 @@ def title_page(result: Result) -> Figure:
         for name, text in names.items()
         if name in coords
     ]
+    is_newmark = solved.is_newmark(result.data)
     compared = [
         "one interface (μs 0.38), two shaking-table tests: θ 5 and 6°, 0.36 and 0.52 g, 1.8 and 3.5 Hz"
     ]
@@ -177,22 +203,25 @@ def title_page(result: Result) -> Figure:
         "Results": [f"{name}: {style.SHOWN[name]['long_name']}" for name in result.variables],
         "Inputs": [*inputs, *filter(None, [style.drawn_text(attributes)])],
         "Model and estimates": style.model_text(attributes).splitlines(),
-        "Range in which the model was compared with measurements": compared,
     }
+    if not is_newmark:
+        sections["Range in which the model was compared with measurements"] = compared
     if unsound := solved.unsound_texts(result.data):
         sections["Unsound"] = unsound
     if not solved.is_recorded(result.data):
         left_out = "; left out of contours and curves unless their caption says that it is drawn"
         sections["Flags that the charts hatch"] = [
-            f"{style.flag_name(flag)} ({flag.kind}): {flag.text}{left_out if flag in solved.LEFT_OUT else ''}"
+            f"{style.FLAG_TEXT[flag]}: {style.flag_name(flag)} ({flag.kind}): {flag.text}"
+            f"{left_out if flag in solved.LEFT_OUT else ''}"
             for flag in maps.HATCHES
+            if flag in _NEWMARK_FLAGS or not is_newmark
         ]
     sections["Origin"] = [
         style.plain(result.name),
         f"solved by {attributes.get('source', 'slipsweep')}",
         f"drawn by slipsweep {__version__}, matplotlib {mpl.__version__}",
         *style.plain(str(attributes.get("history", ""))).splitlines(),
-        REFERENCE,
+        MODELS.from_attributes(attributes).reference,
     ]
     figure = Figure(figsize=(8.27, 11.69))
     title = style.plain(textwrap.fill(str(attributes.get("title", "")), 54))

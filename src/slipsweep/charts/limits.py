@@ -22,6 +22,7 @@ from slipsweep.charts.suites import draw_suite, suite_text
 from slipsweep.errors import InputError
 from slipsweep.files.selection import axis_labels
 from slipsweep.model.variables import LimitStatus
+from slipsweep.published import EQUATIONS
 from slipsweep.studies.suite_statistics import SUITE, limit_quantiles
 
 #: Most grid points of annual rates, a curve each; most displacements that are marked.
@@ -49,9 +50,9 @@ def limit(result: Result, options: Options) -> Figure:
     # one scale for all, from zero; only now, for it ends the autoscaling
     sheet.panels[0].axes.set_ylim(bottom=0.0)
     if not np.isfinite(sheet.data["limit_amplitude"]).any():
-        sheet.notes.append("No limits to draw: limit_status has the reasons.")
+        sheet.note("No limits to draw: limit_status has the reasons.")
     if suite:
-        sheet.notes.append(_suite_text(sheet.data))
+        sheet.note(_suite_text(sheet.data))
     return sheet.done()
 
 
@@ -142,6 +143,9 @@ def hazard(result: Result, options: Options) -> Figure:
         str(dim): size for dim, size in rates["annual_rate"].sizes.items() if dim != "threshold"
     }
     points = [zip(grid, at, strict=True) for at in np.ndindex(*grid.values())]
+    if "equation" in rates.dims:
+        labels = [EQUATIONS[str(name)].label for name in rates["equation"].values]
+        rates = rates.assign_coords(equation=labels)
     names = [
         ", ".join(member_text(rates, dim, at, options) for dim, at in point) for point in points
     ]
@@ -188,6 +192,9 @@ def hazard(result: Result, options: Options) -> Figure:
         style.caption(rates, options),
         f"hazard curve: {style.plain(rates.attrs['hazard_curve'])}",
     ]
+    if "conditions" in rates.attrs:
+        texts.append("Rates are by published equations in place of motions.")
+        texts.append(" ".join(str(rates.attrs["conditions"]).splitlines()))
     if few:
         texts.append("Rates are computed at the markers; between them the lines are straight.")
     if (held > 0.5 * lines).any():

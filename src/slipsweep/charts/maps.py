@@ -2,49 +2,63 @@
 
 Values are drawn as they are; contours are those of their logarithm, in which u = W/ω² is a straight
 line over a logarithmic frequency axis.
+
+Regions end where the equations have their limits: at the yield acceleration, at the mode limit and
+at θ = φ, where the block begins to slide under its own weight.  Up to there the cells next to a
+limit go on.  What flags mark has no equation: it consists of cells, half way to their neighbours.
 """
 
 import itertools
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.colors import BoundaryNorm, Colormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
+from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FixedFormatter
-from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import KDTree
 
-from slipsweep.charts import style
+from slipsweep.charts import regions, solved, style
+from slipsweep.charts.regions import Cells
 from slipsweep.charts.sheet import Panel, Sheet
 from slipsweep.charts.slices import Result
 from slipsweep.charts.solved import DISPLACEMENT, DRIVES, has_flags, is_newmark
 from slipsweep.charts.style import Floats, Look, Options
 from slipsweep.errors import InputError
-from slipsweep.model.variables import RESULTS, SlidingMode, Validity
-
-Cells = NDArray[np.bool_]
+from slipsweep.model.variables import RESULTS, VALUELESS, SlidingMode, Validity
 
 #: Colour and hatch of each mode: from light to dark.
 MODES = {
     SlidingMode.STUCK: ("white", ""),
     SlidingMode.STICK_SLIP: ("#F2C56B", "//"),
-    SlidingMode.CONTINUOUS: ("#B07AA8", "\\\\"),
+    SlidingMode.CONTINUOUS: ("#B07AA8", "--"),
 }
 
-#: Hatching of the flags under which there is no value, and of cautions.  Notes have none.
+#: What is drawn over what: values, no sliding, what has no value, hatches; then, over the lines,
+#: what slides under its own weight.
+_VALUES = 0.5
+_STUCK = 1.05
+_MISSING = 1.07
+_HATCHES = 1.1
+_UNSTABLE = 2.1
+
+#: Colour of cells whose value is missing or left out: white means no sliding.
+NO_VALUE = "0.88"
+
+#: Hatching of the flags under which there is no value, and of cautions: signs that differ also
+#: where they are small.  Notes have none.
 HATCHES = {
     Validity.STATICALLY_UNSTABLE: "\\\\\\",
     Validity.UPLIFT: "|||",
     Validity.LIMIT_UNDEFINED: "oo",
     Validity.FRICTION_NOT_DECAYING: "---",
-    Validity.KD_NOT_POSITIVE: "xxx",
+    Validity.KD_NOT_POSITIVE: "**",
     Validity.NOT_RECOUPLED: "xx",
     Validity.FLEXIBLE_BLOCK: "++",
     Validity.UPSLOPE: "OO",
@@ -71,13 +85,14 @@ def contours(result: Result, options: Options) -> Figure:
     levels = levels or _levels(name, drawn.values)
     if not levels or not np.isfinite(drawn).any():
         why = "all values are about the same" if (drawn > 0).any() else "no values above zero"
-        sheet.notes.append(f"No contours: {why}.")
+        sheet.note(f"No contours: {why}.")
         return _finish(sheet, name)
     logs = xr.apply_ufunc(np.log10, drawn.clip(min=levels[0]))
     growth = [logs.diff(dim) for dim in (sheet.x, str(sheet.y))]
     if any((abs(one) > 1.0).sum() > _COARSE * (one != 0.0).sum() for one in growth):
-        sheet.notes.append(
-            "Coarse grid: values grow more than tenfold from cell to cell; read none between cells."
+        sheet.note(
+            "Coarse grid: values grow more than tenfold from cell to cell; read none between cells.",
+            "Coarse grid: read no values between cells.",
         )
     of_length = RESULTS[name].get("units") == "m"
     texts = [
@@ -105,7 +120,7 @@ def newmark(result: Result, options: Options) -> Figure:
     )
     there = sheet.data["drawn"].where(sheet.data["drawn"] > 0)
     if not there.count():
-        sheet.notes.append("No ratio: no displacement above zero.")
+        sheet.note("No ratio: no displacement above zero.")
         return _finish(sheet, DISPLACEMENT)
     farthest = np.abs(np.log10(there)).max()
     # the colour changes at these and at their inverses; the first is as good as one
@@ -128,11 +143,19 @@ def modes(result: Result, options: Options) -> Figure:
         ["sliding_mode", "validity"],
         ("theta", "yield_coefficient", "mu_s", "frequency"),
     )
-    for panel, (mode, (colour, hatch)) in itertools.product(sheet.panels, MODES.items()):
-        look = {"facecolor": colour, "edgecolor": "white" if hatch else "0.6", "hatch": hatch}
-        _mark(
-            sheet, panel, panel.grid("sliding_mode") == int(mode), style.MODE_TEXT[mode], look, 0.5
-        )
+    for panel in sheet.panels:
+        found = panel.grid("sliding_mode")
+        # continuous sliding and no sliding cover what they take of the rest
+        margins = {
+            SlidingMode.STUCK: (-regions.excess_over(panel, "yield_line"), _STUCK),
+            SlidingMode.STICK_SLIP: (np.ma.ones(found.shape), _VALUES),
+            SlidingMode.CONTINUOUS: (regions.excess_over(panel, "limit_line"), _VALUES + 0.1),
+        }
+        for mode, (colour, hatch) in MODES.items():
+            if not (found == mode).any():
+                continue
+            look = {"facecolor": colour, "edgecolor": "white" if hatch else "0.6", "hatch": hatch}
+            _fill(sheet, panel, *margins[mode], style.MODE_TEXT[mode], look)
     return _finish(sheet, "sliding_mode")
 
 
@@ -142,20 +165,18 @@ def _sheet(result: Result, options: Options, names: list[str], across: Sequence[
     varies = across[0] == "frequency" or "displacement_amplitude" in result.data.coords
     sheet = result.sheet(options, names, across, y=DRIVES, same=[] if varies else ["frequency"])
     sheet.show(names[0], f"Hatched {UNSOUND_HATCH}")
+    # the lines go on to where the block slides under its own weight, which is drawn over them
+    sheet.data = sheet.data.assign(solved.boundaries(sheet.data))
+    for panel in sheet.panels:
+        panel.axes.set_facecolor(NO_VALUE)
     for panel, (name, (text, look)) in itertools.product(sheet.panels, style.LINES.items()):
-        excess = _excess(panel, name)
-        if excess.count() and excess.min() < 0 < excess.max():
+        excess = regions.excess_over(panel, name)
+        there = excess[regions.at_rest(panel)].compressed()
+        if there.size and there.min() < 0 < there.max():
             drawing: Look = {f"{key}s": [value] for key, value in look.items()}
             panel.axes.contour(panel.xs, panel.ys, excess, [0.0], **drawing).set_gid(name)
             sheet.remarks[text] = Line2D([], [], **look)
     return sheet
-
-
-def _excess(panel: Panel, line: str) -> Any:
-    """Amplitudes over a threshold, masked where there is none."""
-    return np.ma.masked_invalid(
-        panel.grid("amplitude") - (panel.grid(line) if line in panel.data else np.nan)
-    )
 
 
 def _fill_panels(
@@ -171,18 +192,26 @@ def _fill_panels(
         ys = panel.ys
         with np.errstate(divide="ignore", invalid="ignore"):
             logs = np.log10(panel.grid("drawn"))
-        # what contours leave open along the mode limit and cells without a value has the colours of
-        # the cells
-        cells = np.ma.masked_invalid(logs)
-        panel.axes.pcolormesh(xs, ys, cells, shading="nearest", zorder=0.4, rasterized=True, **look)
-        beyond = _excess(panel, "limit_line").filled(-1.0) > 0
-        for side in (~beyond, beyond):  # no contour crosses the jump
-            shown = np.ma.masked_invalid(np.where(side, logs, np.nan))
-            if shown.count():
-                areas = panel.axes.contourf(xs, ys, shown, places, zorder=0.5, extend=end, **look)
-                lines = panel.axes.contour(xs, ys, shown, places, **line)
-                lines.set_gid("contours")
-                _label_contours(panel, lines, dict(zip(places, texts, strict=True)))
+        # of a ratio there is none where nothing slides
+        slides = (regions.excess_over(panel, "yield_line") > 0).filled(True)
+        edges = (
+            regions.edges_of(xs, panel.axes.get_xscale()),
+            regions.edges_of(ys, panel.axes.get_yscale()),
+        )
+        for side, region in regions.sides_of(panel):  # no contour crosses the jump
+            inside = side & (slides | np.isfinite(logs))
+            shown = np.ma.masked_invalid(np.where(inside, logs, np.nan))
+            if not shown.count():
+                continue
+            filled = np.ma.masked_invalid(regions.continued(logs, inside))
+            # what contours leave open along cells without a value has the colours of the cells
+            cells = panel.axes.pcolormesh(*edges, filled, zorder=0.4, rasterized=True, **look)
+            areas = panel.axes.contourf(xs, ys, filled, places, zorder=_VALUES, extend=end, **look)
+            for artist in (cells, areas):
+                regions.clip(panel, artist, region)
+            lines = panel.axes.contour(xs, ys, shown, places, **line)
+            lines.set_gid("contours")
+            _label_contours(panel, lines, dict(zip(places, texts, strict=True)))
     if areas is None:
         return
     bar = sheet.figure.colorbar(
@@ -244,57 +273,112 @@ def _levels(name: str, values: Floats) -> list[float]:
 
 def _finish(sheet: Sheet, name: str) -> Figure:
     """Area of no sliding, hatching, legend and caption of a map."""
-    scraps: dict[str, int] = {}
+    scraps: Counter[Validity | None] = Counter()
     for panel in sheet.panels:
-        excess = _excess(panel, "yield_line")
-        if name != "sliding_mode" and excess.count() and excess.min() < 0:
-            # left white up to the line of yield: no colour of a displacement stands for what does
-            # not slide
-            if excess.max() > 0:
-                levels = [float(excess.min()) - 1.0, 0.0]
-                panel.axes.contourf(panel.xs, panel.ys, excess, levels, colors="white", zorder=1.05)
-            sheet.legend[style.NO_SLIDING] = Patch(
-                facecolor="white", edgecolor="0.6", linewidth=0.6
-            )
-        hatches = {
-            style.flag_name(flag): (has_flags(panel.data["validity"], flag), HATCHES[flag])
-            for flag in HATCHES
-        }
-        if "unsound" in panel.data:
-            hatches[style.UNSOUND] = panel.data["unsound"], UNSOUND_HATCH
-        for text, (cells, hatch) in hatches.items():
-            flagged = panel.grid(cells)
-            large = _large(panel, flagged)
-            scraps[text] = scraps.get(text, 0) + int((flagged & ~large).sum())
-            _mark(
-                sheet,
-                panel,
-                large,
-                text,
-                {"facecolor": "none", "edgecolor": "0.2", "hatch": hatch},
-                1.1,
-            )
-    small = [
-        f"{' '.join(text.split())} ({count} cell{'s' * (count > 1)})"
-        for text, count in scraps.items()
-        if count
-    ]
-    if small:
-        sheet.notes.append(f"Also, in regions too small to hatch: {'; '.join(small)}.")
+        if name != "sliding_mode":
+            _whiten(sheet, panel)
+        _draw_unstable(sheet, panel)
+        scraps += _hatch(sheet, panel)
+    if scraps:
+        counts = {flag: f"({count} cell{'s' * (count > 1)})" for flag, count in scraps.items()}
+        names = [f"{_name(flag)} {count}" for flag, count in counts.items()]
+        words = [f"{_words(flag)} {count}" for flag, count in counts.items()]
+        sheet.note(
+            f"Also, in regions too small to hatch: {'; '.join(names)}.",
+            f"Too small to hatch: {'; '.join(words)}.",
+        )
     if name != "sliding_mode":
         sheet.note_left_out(name)
     return sheet.done(beside=False)
 
 
-def _mark(sheet: Sheet, panel: Panel, cells: Cells, label: str, look: Look, zorder: float) -> None:
-    """Cover cells, half way to their neighbours, with a colour or hatch, and give the legend an entry."""
-    if not cells.any():
+def _words(flag: Validity | None) -> str:
+    """What the legend calls a flag; None: a trend that no block has."""
+    return style.UNSOUND if flag is None else style.FLAG_TEXT[flag]
+
+
+def _name(flag: Validity | None) -> str:
+    """What full captions call a flag: as results do."""
+    return " ".join(style.UNSOUND.split()) if flag is None else style.flag_name(flag)
+
+
+def _whiten(sheet: Sheet, panel: Panel) -> None:
+    """Leave white what does not slide, up to the line of yield: no colour of a displacement stands for it."""
+    excess = regions.excess_over(panel, "yield_line")
+    if (excess[regions.at_rest(panel)] < 0).any():
+        look = {"facecolor": "white", "edgecolor": "0.6", "hatch": ""}
+        _fill(sheet, panel, -excess, _STUCK, style.NO_SLIDING, look)
+
+
+def _draw_unstable(sheet: Sheet, panel: Panel) -> None:
+    """Hatch what slides under its own weight, to where Üy is zero."""
+    if regions.at_rest(panel).all():
         return
-    with mpl.rc_context({"hatch.linewidth": 0.6}):
-        fill: Look = {"colors": [look["facecolor"]], "hatches": [look["hatch"]], "zorder": zorder}
-        area = panel.axes.contourf(panel.xs, panel.ys, cells.astype(float), [0.5, 1.5], **fill)
-        area.set(edgecolor=look["edgecolor"], linewidth=0, gid=label)
-        sheet.legend[label] = Patch(linewidth=0.6, **look)
+    flag = Validity.STATICALLY_UNSTABLE
+    look = {"facecolor": NO_VALUE, "edgecolor": "0.2", "hatch": HATCHES[flag]}
+    area = _fill(sheet, panel, -panel.grid("rest_angle"), _UNSTABLE, _words(flag), look)
+    area.set_gid(style.flag_name(flag))
+
+
+def _hatch(sheet: Sheet, panel: Panel) -> Counter[Validity | None]:
+    """Hatch the cells of each flag but the first, and what no block does; count those not hatched."""
+    validity = panel.data["validity"]
+    rests = regions.at_rest(panel)
+    missing = panel.grid(has_flags(validity, VALUELESS)) & rests
+    if missing.any():
+        look = {"facecolor": NO_VALUE, "edgecolor": "none", "hatch": ""}
+        regions.paint(panel, *regions.steps(panel, missing), _MISSING, look)
+    marks: dict[Validity | None, tuple[xr.DataArray, str]] = {
+        flag: (has_flags(validity, flag), hatch)
+        for flag, hatch in HATCHES.items()
+        if flag != Validity.STATICALLY_UNSTABLE
+    }
+    if "unsound" in panel.data:
+        marks[None] = panel.data["unsound"], UNSOUND_HATCH
+    sides = regions.sides_of(panel)
+    scraps: Counter[Validity | None] = Counter()
+    for flag, (cells, hatch) in marks.items():
+        flagged = panel.grid(cells)
+        large = _large(panel, flagged)
+        scraps[flag] = int((flagged & ~large).sum())
+        look = {"facecolor": "none", "edgecolor": "0.2", "hatch": hatch}
+        if flag is not None and flag in VALUELESS:
+            look["facecolor"] = NO_VALUE
+            if large.any():
+                _draw_cells(sheet, panel, flag, large, None, _UNSTABLE + 0.1, look)
+            continue
+        for side, region in sides:
+            if (large & side).any():
+                _draw_cells(
+                    sheet, panel, flag, regions.continued(large, side), region, _HATCHES, look
+                )
+    return +scraps
+
+
+def _draw_cells(
+    sheet: Sheet,
+    panel: Panel,
+    flag: Validity | None,
+    cells: Cells,
+    region: Path | None,
+    zorder: float,
+    look: Look,
+) -> None:
+    """Hatch cells, within a region if one is given, and give the legend an entry."""
+    area = regions.paint(panel, *regions.steps(panel, cells), zorder, look)
+    area.set_gid(style.UNSOUND if flag is None else style.flag_name(flag))
+    regions.clip(panel, area, region)
+    sheet.legend[_words(flag)] = regions.legend_patch(panel, look)
+
+
+def _fill(sheet: Sheet, panel: Panel, margin: Any, zorder: float, text: str, look: Look) -> Any:
+    """Fill the region in which a margin, known at the cells, is above zero, and give the legend an entry."""
+    there = ~np.ma.getmaskarray(margin)
+    margin = regions.continued(np.ma.getdata(margin), there)
+    area = regions.paint(panel, panel.xs, panel.ys, margin, zorder, look)
+    area.set_gid(text)
+    sheet.legend[text] = regions.legend_patch(panel, look)
+    return area
 
 
 def _large(panel: Panel, cells: Cells) -> Cells:

@@ -1,5 +1,6 @@
 """The one builder of figures, without pyplot: size, panels, axes, legend outside of the data, caption, grey."""
 
+import io
 import itertools
 import math
 import textwrap
@@ -14,6 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from slipsweep.charts import solved, style
@@ -21,6 +23,9 @@ from slipsweep.charts.style import Floats, Look, Options
 from slipsweep.errors import InputError
 from slipsweep.files.selection import axis_labels, axis_numbers
 from slipsweep.model.variables import Validity
+from slipsweep.motion.records import Record
+from slipsweep.motion.suites import Suite
+from slipsweep.studies.upslope import sliding_ways
 
 #: Dashes and markers of the curves of a family, and how many markers a curve has.
 _DASHES = (
@@ -45,6 +50,19 @@ _LINE = 0.165
 _LINES = 4
 
 
+#: Name of colour maps without colour.
+_GREY = "grey of slipsweep"
+
+
+class Chart(Figure):
+    """A figure that a notebook shows as a picture, also if neither pyplot nor a backend is loaded."""
+
+    def _repr_png_(self) -> bytes:
+        content = io.BytesIO()
+        self.savefig(content, format="png")
+        return content.getvalue()
+
+
 class Drawing:
     """A figure of panels with a legend, in which what several panels have is once, and a caption.
 
@@ -57,10 +75,11 @@ class Drawing:
         self, options: Options, rows: int, columns: int, size: tuple[float, float], **shared: Any
     ) -> None:
         self.options = options
-        axes = options.ax
+        self.figure: Figure
+        axes: object = options.ax
         if axes is None:
             factor = 1.0 if options.inches is None else options.inches / size[0]
-            self.figure = Figure(figsize=(size[0] * factor, size[1] * factor), layout="constrained")
+            self.figure = Chart(figsize=(size[0] * factor, size[1] * factor), layout="constrained")
             self.grid = self.figure.subplots(
                 rows, columns, **{"sharex": True, "sharey": True, **shared}, squeeze=False
             )
@@ -78,55 +97,94 @@ class Drawing:
         self.remarks: dict[str, Artist] = {}
         self.notes: list[str] = []
 
+    def note(self, text: str, short: str | None = None) -> None:
+        """Add a sentence to the caption, or a shorter one to a short caption ("": none)."""
+        sentence = short if short is not None and self.options.is_brief else text
+        if sentence:
+            self.notes.append(sentence)
+
     def finish(self, texts: Sequence[str], beside: bool = True) -> Figure:
-        """Draw the legend, beside or above the panels, and a caption of `texts` and the notes under them."""
+        """Draw the title, the legend beside or above the panels, and a caption of `texts` and notes."""
         entries = self.legend | self.remarks
-        axes = self.options.ax
-        handles = (list(entries.values()), list(entries))
         look = Look(fontsize="small", frameon=False)
-        width, height = self.figure.get_size_inches()
-        text_width = width * 10.0 / self.options.font  # inches of text of 10 points
-        available = axes.get_window_extent().width / self.figure.dpi if axes else text_width
-        characters = max(20, int(_CHARACTERS * available))
-        every = [line for text in (*texts, *self.notes) for line in text.splitlines()]
-        caption = [line for text in every for line in textwrap.wrap(text, characters)]
-        if axes is not None:
-            right = any(other.yaxis.get_ticks_position() == "right" for other in axes.child_axes)
-            if entries:
-                axes.legend(
-                    *handles, loc="upper left", bbox_to_anchor=(1.2 if right else 1.02, 1.0), **look
-                )
-            axes.annotate(
-                "\n".join(caption),
-                (0.5, 0.0),
-                (0.0, -4.0),
-                xycoords=axes.xaxis.label,
-                textcoords="offset points",
-                ha="center",
-                va="top",
-                fontsize="x-small",
-                annotation_clip=False,
-            )
+        if any(isinstance(artist, Patch) for artist in entries.values()):
+            look["handleheight"] = 1.3  # for hatches
+        if self.options.ax is None:
+            self._lay_out(texts, entries, beside, look)
         else:
-            self._set_small()
-            beside = beside and width > 5.0
-            columns = 1 if beside else max(1, int(text_width / 2.2))
-            if entries:
-                self.figure.legend(
-                    *handles,
-                    loc="outside right upper" if beside else "outside upper center",
-                    ncols=columns,
-                    handlelength=3.2,
-                    **look,
-                )
-            self.figure.supxlabel("\n".join(caption), fontsize="small")
-            longest = max((text.count("\n") + 1 for text in entries), default=0)
-            lines = 0 if beside or not entries else math.ceil(len(entries) / columns) * longest - 1
-            more = max(0, lines + len(caption) - _LINES) * _LINE * self.options.font / 10.0
-            self.figure.set_size_inches(width, height + more)
+            self._add_to(self.options.ax, texts, entries, look)
         if self.options.grey:
             _without_colour(self.figure)
         return self.figure
+
+    def _wrapped(self, texts: Sequence[str], characters: int) -> list[str]:
+        """The lines of a caption; the notes of a short one are a paragraph."""
+        notes = [" ".join(self.notes)] if self.options.is_brief else self.notes
+        every = [line for text in (*texts, *notes) for line in text.splitlines()]
+        return [line for text in every for line in textwrap.wrap(text, characters)]
+
+    def _add_to(
+        self, axes: Axes, texts: Sequence[str], entries: dict[str, Artist], look: Look
+    ) -> None:
+        """Title, legend and caption beside the axes of another figure."""
+        if self.options.title:
+            axes.set_title(style.plain(self.options.title))
+        right = any(other.yaxis.get_ticks_position() == "right" for other in axes.child_axes)
+        if entries:
+            place = (1.2 if right else 1.02, 1.0)
+            axes.legend(
+                [*entries.values()], [*entries], loc="upper left", bbox_to_anchor=place, **look
+            )
+        width = axes.get_window_extent().width / self.figure.dpi
+        axes.annotate(
+            "\n".join(self._wrapped(texts, max(20, int(_CHARACTERS * width)))),
+            (0.5, 0.0),
+            (0.0, -4.0),
+            xycoords=axes.xaxis.label,
+            textcoords="offset points",
+            ha="center",
+            va="top",
+            fontsize="x-small",
+            annotation_clip=False,
+        )
+
+    def _lay_out(
+        self, texts: Sequence[str], entries: dict[str, Artist], beside: bool, look: Look
+    ) -> None:
+        """Title, legend and caption of a figure, which grows by the lines that they need."""
+        self._set_small()
+        width, height = self.figure.get_size_inches()
+        size = self.options.font / 10.0
+        text_width = width / size  # inches of text of 10 points
+        characters = int(_CHARACTERS * text_width)
+        caption = self._wrapped(texts, characters)
+        beside = beside and width > 5.0
+        columns = 1 if beside else max(1, int(text_width / 2.2))
+        longest = max((text.count("\n") + 1 for text in entries), default=0)
+        above = 0 if beside or not entries else math.ceil(len(entries) / columns) * longest - 1
+        lines: float = max(0, above + len(caption) - _LINES)
+        if self.options.title:
+            # the layout has no place for a legend below a title of the figure: it is the legend's
+            is_left = bool(entries) and beside  # of the legend
+            shown = textwrap.fill(self.options.title, int((0.42 if is_left else 0.66) * characters))
+            lines += shown.count("\n") + 1.5
+            if entries and not beside:
+                look |= {"title": style.plain(shown), "title_fontsize": "large"}
+            else:
+                place = 0.36 if is_left else 0.5
+                self.figure.suptitle(style.plain(shown), fontsize="large", x=place)
+        self.figure.set_size_inches(width, height + lines * _LINE * size)
+        if entries:
+            legend = self.figure.legend(
+                [*entries.values()],
+                [*entries],
+                loc="outside right upper" if beside else "outside upper center",
+                ncols=columns,
+                handlelength=3.2,
+                **look,
+            )
+            legend.get_title().set_multialignment("center")
+        self.figure.supxlabel("\n".join(caption), fontsize="small")
 
     def _set_small(self) -> None:
         """Sizes of text, in points: ticks are made only when the figure is drawn."""
@@ -142,15 +200,19 @@ class Drawing:
 
 
 def _without_colour(figure: Figure) -> None:
-    """Replace all colours by their lightness."""
+    """Replace all colours by their lightness, those of maps by lighter ones, on which hatches show."""
     for artist in figure.findobj():
         if isinstance(artist, ScalarMappable) and artist.get_array() is not None:
             given = artist.get_cmap()
+            if given.name == _GREY:  # of a chart that was drawn in other axes before
+                continue
+            # lines and areas of contours of one colour keep its lightness
+            one_colour = getattr(artist, "colors", None) is not None
+            to_grey = style.to_grey if one_colour else style.to_light_grey
             ends = {"under": given.get_under(), "over": given.get_over()}
-            shades = ListedColormap(style.to_grey(given(np.arange(given.N))))
-            artist.set_cmap(
-                shades.with_extremes(**{end: style.to_grey(one)[0] for end, one in ends.items()})
-            )
+            shades = ListedColormap(to_grey(given(np.arange(given.N))), _GREY)
+            extremes = {end: to_grey(one)[0] for end, one in ends.items()}
+            artist.set_cmap(shades.with_extremes(**extremes))
             continue
         for kind in ("color", "markerfacecolor", "markeredgecolor", "facecolor", "edgecolor"):
             grey = style.to_grey(getattr(artist, f"get_{kind}", list)())
@@ -252,17 +314,29 @@ class Sheet(Drawing):
 
     def note_left_out(self, name: str, *others: xr.DataArray) -> None:
         """Say which unreliable values are left out or drawn on request; displacements upslope have no logarithm."""
-        flags = [*others, *([self.data["validity"]] if "validity" in self.data else [])]
-        groups: dict[str, list[str]] = {}
-        for flag, text in solved.LEFT_OUT.items():
-            if any(solved.has_flags(one, flag).any() for one in flags):
+        validities = [*others, *([self.data["validity"]] if "validity" in self.data else [])]
+        groups: dict[str, list[Validity]] = {}
+        for flag in solved.LEFT_OUT:
+            if any(solved.has_flags(one, flag).any() for one in validities):
                 drawn = self.options.show_cautions and not (
                     name == solved.DISPLACEMENT and flag == Validity.UPSLOPE
                 )
-                groups.setdefault("Drawn on request" if drawn else "Left out", []).append(text)
-        self.notes += [
-            f"{heading}: values flagged {' or '.join(texts)}." for heading, texts in groups.items()
-        ]
+                groups.setdefault("Drawn on request" if drawn else "Left out", []).append(flag)
+        for heading, flags in groups.items():
+            texts = " or ".join(solved.LEFT_OUT[flag] for flag in flags)
+            words = ", ".join(style.FLAG_TEXT[flag] for flag in flags)
+            self.note(f"{heading}: values flagged {texts}.", f"{heading}: {words}.")
+
+    def note_slides_back(self, motion: Record | Suite | None) -> None:
+        """Say of how many sliding cells the block would also slide upslope, which is left out."""
+        shown = solved.reliable(self.data, solved.DISPLACEMENT, self.options.show_cautions) > 0
+        ways = sliding_ways(self.data, motion)
+        if ways is not None and (shown & ways[1]).any():
+            percent = solved.percent(int((shown & ways[1]).sum()) / int(shown.sum()))
+            self.note(
+                f"In {percent} of the sliding cells shown {solved.SLIDES_BACK}.",
+                f"{percent} would also slide upslope: displacement too large.",
+            )
 
     def show(self, name: str, marked: str, always: bool = False) -> None:
         """Add to the slice what charts of a result draw.
@@ -281,20 +355,24 @@ class Sheet(Drawing):
             ratio = (drawn / theirs).where(lambda one: np.isfinite(one) & (one > 0))
             if ratio.notnull().any():
                 low, middle, high = np.nanquantile(ratio, (0.05, 0.5, 0.95))
-                self.notes.append(
-                    f"Ratio to the displacement of Newmark's block with the same Üy: median {middle:.3g}; "
-                    f"90 % of the sliding cells shown lie between {low:.3g} and {high:.3g}."
+                self.note(
+                    "Ratio to the displacement of Newmark's block with the same Üy: "
+                    f"median {middle:.3g}; "
+                    f"90 % of the sliding cells shown lie between {low:.3g} and {high:.3g}.",
+                    short="",
                 )
         self.data["unsound"], trends = solved.unsound(self.data, drawn, theirs)
         if trends:
             share = solved.percent(int(self.data["unsound"].sum()) / int((drawn > 0).sum()))
-            self.notes.append(
-                f"{marked}: {share} of the sliding cells shown. {trends[0].upper()}{trends[1:]}."
+            self.note(
+                f"{marked}: {share} of the sliding cells shown. {trends[0].upper()}{trends[1:]}.",
+                f"{marked}: {share} of the sliding cells, a trend that no block has.",
             )
         if "limit_line" in self.data and "validity" in self.data:
             continuous = self.data["amplitude"] > self.data["limit_line"]
             text = solved.estimated(self.data, drawn, continuous.reset_coords(drop=True))
-            self.notes += [f"{text}."] if text else []
+            if text:
+                self.note(f"{text}.", f"{text}.".replace(" of the sliding cells", ""))
 
     def done(self, beside: bool = True) -> Figure:
         """Draw legend and caption."""
@@ -305,7 +383,9 @@ class Sheet(Drawing):
             f"{dim} {style.plain(label)}: "
             for dim, label in self.data.attrs.get("picked", {}).items()
         )
-        text = f"{picked}{style.caption(self.data, self.options)}; {self.data.attrs.get('source', 'slipsweep')}"
+        text = f"{picked}{style.caption(self.data, self.options)}"
+        if not self.options.is_brief:
+            text += f"; {self.data.attrs.get('source', 'slipsweep')}"
         cases = []
         own = [
             name

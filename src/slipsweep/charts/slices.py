@@ -14,6 +14,7 @@ from slipsweep.charts.style import SHOWN, Options, check_attributes
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.motions import read_embedded
 from slipsweep.files.selection import At, Place, axis_labels, between, find
+from slipsweep.model.options import check_one_way
 from slipsweep.model.variables import PARAMETERS, STATISTIC_COORDINATES, STATISTICS
 
 #: Dimensions whose places have names, and no order.
@@ -33,6 +34,9 @@ _CURVES = 6
 _PANELS = 3
 _POINTS = 600
 
+#: What draws a cell that no axis is left for.
+_OF_ONE_CELL = "slipsweep simulate draws the time history of one cell"
+
 #: What is kept of an axis: a slice of it, or places, some of which may lie between its values.
 Kept = slice | Sequence[Place]
 
@@ -50,6 +54,7 @@ class Result:
         self.name = str(name)
         self.attrs = data.attrs
         self.sort = _sort(data)
+        check_one_way(f"{name}: charts and explore", data.attrs.get("sliding"))
         if self.sort in OTHER_SORTS and self.sort != "limit":
             self.data = data
             self.variables = []
@@ -58,7 +63,10 @@ class Result:
         self.variables = [str(one) for one in data.data_vars if one in SHOWN]
         if not self.variables:
             raise InputError(f'{name}: not a result of "slipsweep run"')
-        self.motion = read_embedded(data, Path(name)) if self.sort == "record" else None
+        recorded = self.sort in ("record", "suite")
+        #: The recorded motion or motions, if the file has them; and the one to solve slices under.
+        self.shaking = read_embedded(data, Path(name)) if recorded else None
+        self.motion = self.shaking if self.sort == "record" else None
         data = data[self.variables]
         if 0 in data.sizes.values():
             raise InputError(f"{name}: holds no cells")
@@ -97,6 +105,13 @@ class Result:
             *self.wide,
             *(dim for dim in NAMED if dim in self.dims and self.data.sizes[dim] > 1),
         ]
+
+    def check_axes(self) -> None:
+        """Refuse the result of a sweep that has no axis to draw a chart over (InputError)."""
+        if self.sort in ("sweep", "record") and not self.wide:
+            raise InputError(
+                f"{self.name}: no axis has two values or more, which charts need; {_OF_ONE_CELL}"
+            )
 
     def result(self, name: str) -> str:
         """`name` if it is a result in the file (InputError otherwise, naming those there are)."""
@@ -269,6 +284,8 @@ class Result:
         sheet = Sheet(self.select(names, kept, options.at), across, up, options, panels[:2])
         for side in ("x", "y") if y else () if isinstance(x, str) or across in NAMED else ("x",):
             sheet.set_axis(side)
+        if names[0] == DISPLACEMENT:
+            sheet.note_slides_back(self.shaking)
         return sheet
 
     def _axis(
@@ -289,9 +306,10 @@ class Result:
         found = next((dim for dim in (*preferred, *free) if dim in free), None)
         if found is None:
             fixed = f"; --at fixes {', '.join(options.at)}" if options.at else ""
+            hint = "" if more else f"; {_OF_ONE_CELL}"
             raise InputError(
                 f"{self.name}: this chart needs {'another' if more else 'an'} axis with two values or more{more}; "
-                f"there are: {', '.join(there) or 'none'}{fixed}"
+                f"there are: {', '.join(there) or 'none'}{fixed}{hint}"
             )
         return found
 

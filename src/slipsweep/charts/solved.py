@@ -1,7 +1,7 @@
 """What charts compute on their slice, and what a run warns of: thresholds, other options, trends that no block has."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable
 from typing import Any
 
 import numpy as np
@@ -18,8 +18,11 @@ from slipsweep.model.variables import (
     SlidingMode,
     Validity,
 )
+from slipsweep.motion.records import Record
+from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import WAVEFORMS, peak_acceleration
 from slipsweep.studies.datasets import friction_parameters, sweep
+from slipsweep.studies.upslope import sliding_ways
 
 #: Amplitudes of a motion.
 DRIVES = ("amplitude", "displacement_amplitude")
@@ -33,11 +36,21 @@ _LOOKED_AT_OTHERS = 25_000
 
 _BLOCK = ("theta", "mu_s", "yield_acceleration")
 
+#: Coordinates that decide which way a block slides.
+_DRIVING = (*_BLOCK, *DRIVES, *STRENGTHS[1:], "time_scale", "polarity", "azimuth", "motion")
+
 #: Flags of values that are unreliable, left out unless requested, and what captions say of them.
 LEFT_OUT = {
     Validity.NOT_RECOUPLED: "not_recoupled (does not come to rest within the cycle)",
     Validity.UPSLOPE: "upslope (ends above where it began)",
 }
+
+
+#: What is said of cells whose block would also slide upslope.
+SLIDES_BACK = (
+    "the base's acceleration also exceeds the upslope yield acceleration: the displacement is too "
+    'large; sliding = "both" of [model] friction = "newmark" includes sliding back'
+)
 
 
 def is_recorded(data: xr.Dataset) -> bool:
@@ -97,17 +110,33 @@ def thresholds(data: xr.Dataset, always: bool = False) -> xr.Dataset:
     """
     if is_recorded(data) and "half_wave_peak" not in data:
         return xr.Dataset()
+    lines = boundaries(data, always)
+    return lines.drop_vars("rest_angle").where(lines["rest_angle"] > 0)
+
+
+def boundaries(data: xr.Dataset, always: bool = False) -> xr.Dataset:
+    """As `thresholds`, also where the block slides under its own weight, and ``rest_angle``, degrees.
+
+    The angle, arctan(Üy/g), is by how much the base may be steeper before the block slides under
+    its own weight: φ − θ with Coulomb's Üy.  Between cells on either side of this limit, where the
+    angle is 0, the other two go on smoothly.
+    """
     g = float(data.attrs["g"])
+    lines = {}
     if "yield_coefficient" in data.coords:
-        return xr.Dataset({"yield_line": data["yield_coefficient"] * g}).reset_coords(drop=True)
-    given = {name: _bare(data[name]) for name in _BLOCK if name in data.coords}
-    # neither depends on the amplitude, nor on what it is taken for otherwise
-    found = friction_parameters(
-        amplitude=0.0, delta_mu=0.0, decay_rate=0.0, model=Mendez(g=g), **given
-    )
-    lines = {"yield_line": found["yield_acceleration"].where(lambda onset: onset > 0)}
-    if always or not is_newmark(data):
-        lines["limit_line"] = found["limiting_acceleration"].where(found["validity"] == 0)
+        onset = data["yield_coefficient"] * g
+    else:
+        given = {name: _bare(data[name]) for name in _BLOCK if name in data.coords}
+        # neither depends on the amplitude, nor on what it is taken for otherwise
+        found = friction_parameters(
+            amplitude=0.0, delta_mu=0.0, decay_rate=0.0, model=Mendez(g=g), **given
+        )
+        onset = found["yield_acceleration"]
+        if always or not is_newmark(data):
+            undefined = has_flags(found["validity"], Validity.LIMIT_UNDEFINED)
+            lines["limit_line"] = found["limiting_acceleration"].where(~undefined)
+    lines["yield_line"] = onset
+    lines["rest_angle"] = xr.apply_ufunc(lambda ratio: np.degrees(np.arctan(ratio)), onset / g)
     return xr.Dataset(lines).reset_coords(drop=True)
 
 
@@ -124,11 +153,12 @@ def has_flags(validity: xr.DataArray, flags: int) -> xr.DataArray:
 
 
 def reliable(results: xr.Dataset, name: str, show_cautions: bool = False) -> xr.DataArray:
-    """A result as it may be drawn: NaN where it is upslope, or left out for its flags."""
+    """A result as it may be drawn: NaN where it is upslope, or left out for its flags, or without any."""
     values = results[name]
     shown = values >= 0
     if "validity" in results and not show_cautions:
-        shown = shown & ~has_flags(results["validity"], sum(LEFT_OUT))
+        flags = results["validity"]
+        shown = shown & flags.notnull() & ~has_flags(flags, sum(LEFT_OUT))
     return values.where(shown).transpose(*values.dims)
 
 
@@ -137,8 +167,9 @@ def unsound(
 ) -> tuple[xr.DataArray, str]:
     """Where the displacements `drawn` of a slice have a trend that no block has, and the trends and shares in words.
 
-    One is smaller than at an amplitude that is 1 % smaller, of recorded motions than at the next
-    smaller amplitude of the slice; or it is less than half of that of Newmark's block, `theirs`.
+    One is smaller than at an amplitude that is 1 % smaller, which is solved for each cell, of
+    recorded motions than at the next smaller amplitude of the slice; or it is less than half of
+    that of Newmark's block, `theirs`.
     """
     ours = data[DISPLACEMENT]
     drive = next(
@@ -181,19 +212,47 @@ def unsound_texts(results: xr.Dataset) -> list[str]:
         return []
     how = (results.attrs.get("waveform"), results.attrs.get(SOLVERS.attribute, "cycle"))
     others = not is_recorded(results) and how != ("sine", "cycle")
-    some = results
-    while some[DISPLACEMENT].size > (_LOOKED_AT_OTHERS if others else _LOOKED_AT):
-        sizes = some[DISPLACEMENT].sizes
-        some = some.isel({max(sizes, key=lambda dim: sizes[dim]): slice(1, None, 2)})
-    counted = (
-        "" if some is results else f" (counted in {some[DISPLACEMENT].size} cells, evenly spaced)"
-    )
+    most = _LOOKED_AT_OTHERS if others else _LOOKED_AT
+    some, counted = _counted(results, results[DISPLACEMENT].dims, most)
     some = some.load()
     drawn = reliable(some, DISPLACEMENT)
     texts = [unsound(some.assign({DISPLACEMENT: drawn}), drawn, newmark(some))[1]]
     if {"sliding_mode", "validity"} <= {*some}:
         texts.append(estimated(some, drawn, some["sliding_mode"] == SlidingMode.CONTINUOUS))
     return [text + counted for text in texts if text]
+
+
+def _counted(results: xr.Dataset, dims: Iterable[Hashable], most: int) -> tuple[xr.Dataset, str]:
+    """Results of at most so many cells along dimensions, and what to say of it if these are not all."""
+    sizes = {dim: results.sizes[dim] for dim in dims}
+    some = results
+    while math.prod(sizes.values()) > most:
+        longest = max(sizes, key=lambda dim: sizes[dim])
+        some = some.isel({longest: slice(1, None, 2)})
+        sizes[longest] = some.sizes[longest]
+    cells = math.prod(sizes.values())
+    return some, "" if some is results else f" (counted in {cells} cells, evenly spaced)"
+
+
+def slides_back_text(results: xr.Dataset, motion: Record | Suite | None = None) -> str:
+    """The share of the sliding cells whose block would also slide upslope, in words; empty if there are none.
+
+    It follows from the coordinates: no result is read.
+    """
+    there = [name for name in _DRIVING if name in results.coords]
+    if DISPLACEMENT not in results or {*DRIVES, *STRENGTHS}.isdisjoint(there):
+        return ""
+    if "displacement_amplitude" in there:
+        there.append("frequency")
+    dims = dict.fromkeys(dim for name in there for dim in results[name].dims)
+    unread = results.drop_vars({*results.data_vars} - {"ground_acceleration"})
+    some, counted = _counted(unread, dims, _LOOKED_AT)
+    ways = sliding_ways(some, motion)
+    if ways is None or not (ways[0] & ways[1]).any():
+        return ""
+    share = float((ways[0] & ways[1]).mean() / ways[0].mean())
+    cells = f"in {percent(share)} of the sliding cells " if dims else ""
+    return f"{cells}{SLIDES_BACK}{counted}"
 
 
 def estimated(data: xr.Dataset, drawn: xr.DataArray, continuous: xr.DataArray) -> str:

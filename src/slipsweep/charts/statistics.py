@@ -83,7 +83,7 @@ def quantiles(result: Result, options: Options) -> Figure:
                 xs, shown[middle], color=BLUE, linewidth=1.8, label=text
             )[0]
     if (most := float(sheet.data["valueless_share"].max())) > 0:
-        sheet.notes.append(f"Without a value: up to {most:.1%} of the samples.")
+        sheet.note(f"Without a value: up to {most:.1%} of the samples.")
     return sheet.done()
 
 
@@ -107,7 +107,8 @@ def sensitivity(result: Result, options: Options) -> Figure:
         raise InputError(
             f"no Sobol indices in this slice: {'; '.join(reasons)}; choose another slice (--at)"
         )
-    sheet.notes += [f"No indices where {text}." for text in reasons]
+    for text in reasons:
+        sheet.note(f"No indices where {text}.")
     inputs = axis_labels(sheet.data, "input")
     symbols = [
         " + ".join(style.SYMBOLS.get(one, style.plain(one)) for one in name.split("+"))

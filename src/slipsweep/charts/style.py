@@ -1,6 +1,7 @@
 """How charts look and what they say: options, colours, symbols, units, labels, captions, cautions."""
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
@@ -17,6 +18,7 @@ from slipsweep.model.options import MODELS
 from slipsweep.model.units import quantity
 from slipsweep.model.variables import INTENSITY_MEASURES, PARAMETERS, SlidingMode, Validity
 from slipsweep.motion.waveforms import WAVEFORMS
+from slipsweep.published import check_equations
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -60,6 +62,7 @@ SYMBOLS = {
     "minimum_friction": "μmin",
     "structure_frequency": "fs",
     "yield_coefficient": "ky",
+    "upslope_yield_acceleration": "Üy,up",
     "scale": "scale",
     "pgv": "PGV",
     "arias_intensity": "Ia",
@@ -74,6 +77,19 @@ MODE_TEXT = {
     SlidingMode.STUCK: "no sliding",
     SlidingMode.STICK_SLIP: "stick–slip",
     SlidingMode.CONTINUOUS: "continuous",
+}
+
+#: What flags are called in legends and short captions.
+FLAG_TEXT = {
+    Validity.STATICALLY_UNSTABLE: "slides under its own weight",
+    Validity.UPLIFT: "loses contact",
+    Validity.LIMIT_UNDEFINED: "Eq. 7 has no limit",
+    Validity.FRICTION_NOT_DECAYING: "friction does not decay",
+    Validity.KD_NOT_POSITIVE: "Eq. 12 cannot stop it",
+    Validity.NOT_RECOUPLED: "does not come to rest",
+    Validity.FLEXIBLE_BLOCK: "block is not rigid",
+    Validity.UPSLOPE: "ends upslope",
+    Validity.NEAR_MODE_LIMIT: "near the mode limit",
 }
 
 #: Other words of legends.
@@ -112,7 +128,11 @@ class Options:
     show_cautions: bool = False
     width: float | str | None = None
     grey: bool = False
+    title: str | None = None
+    caption: Literal["full", "short"] | None = None
     ax: "Axes | None" = None
+    equations: Sequence[str] | str = ()
+    magnitude: float | None = None
     more_panels: bool = False
     heights: list[float] = field(init=False)
     inches: float | None = field(init=False, default=None)
@@ -127,6 +147,9 @@ class Options:
             if not 0 < level < float("inf"):
                 raise InputError(f"levels: {level:g}: must be > 0")
         self.heights = sorted(found)
+        self.equations = check_equations(self.equations)
+        if self.magnitude is not None and not self.equations:
+            raise InputError(f"magnitude = {self.magnitude}: only with equations")
         if len(self.panels) > 2:
             raise InputError(f"--panels {','.join(self.panels)}: must be one axis or two")
         if isinstance(self.width, str):
@@ -135,11 +158,23 @@ class Options:
             self.inches = self.width / 25.4
         if self.inches is not None and not 50.0 <= self.inches * 25.4 <= 1000.0:
             raise InputError(f"width = {self.width}: must be 50 to 1000 mm, as in 90mm")
+        if self.caption not in (None, "full", "short"):
+            raise InputError(f'caption = {self.caption}: must be "full" or "short"')
+
+    @property
+    def is_narrow(self) -> bool:
+        """True if the figure is for a column of a journal: smaller text, and the legend above."""
+        return self.inches is not None and self.inches < 5.0
+
+    @property
+    def is_brief(self) -> bool:
+        """True if the caption is short: as requested, by default where the figure is narrow."""
+        return self.is_narrow if self.caption is None else self.caption == "short"
 
     @property
     def font(self) -> float:
-        """Size of text, points; smaller in figures for a column of a journal."""
-        return 10.0 if self.inches is None or self.inches >= 5.0 else 7.0
+        """Size of text, points; smaller in narrow figures."""
+        return 7.0 if self.is_narrow else 10.0
 
     def scale(self, name: str, g: float) -> float:
         """What to multiply a parameter by to draw it."""
@@ -166,6 +201,13 @@ def to_grey(colour: Any) -> Any:
     return np.column_stack([grey, grey, grey, rgba[:, 3]])
 
 
+def to_light_grey(colour: Any) -> Any:
+    """As `to_grey`, lighter: no darker than black lines and hatches show on."""
+    grey = to_grey(colour)
+    grey[:, :3] = 0.3 + 0.7 * grey[:, :3]
+    return grey
+
+
 def is_acceleration(name: str) -> bool:
     """Whether a parameter is an acceleration, which people give in m/s² or in g."""
     return PARAMETERS.get(name, {}).get("units") == "m s-2"
@@ -173,7 +215,7 @@ def is_acceleration(name: str) -> bool:
 
 def unit(name: str) -> str:
     """The unit of a parameter, result or intensity measure as people write it; nothing for a pure number."""
-    units = _ABOUT[name].get("units", "1")
+    units: str = _ABOUT[name].get("units", "1")
     return _UNITS.get(units, units)
 
 
@@ -217,15 +259,18 @@ def flag_name(flag: int) -> str:
 
 
 def caption(data: xr.Dataset, options: Options | None = None) -> str:
-    """The parameters that have one value, the distributions of uncertain ones, the model and the shaking, in lines."""
+    """Describe what has one value, the uncertain inputs, the model and the shaking, in lines.
+
+    A short caption leaves out the options of the model and the equations of the estimates.
+    """
+    options = options or Options()
     single = [name for name in SYMBOLS if name in data.coords and data[name].size == 1]
-    values = ", ".join(
-        value_text(data, name, data[name].item(), options or Options()) for name in single
-    )
+    values = ", ".join(value_text(data, name, data[name].item(), options) for name in single)
     drawn = drawn_text(data.attrs)
-    return "\n".join(
-        [values, *([f"uncertain: {drawn}"] if drawn else []), model_text(data.attrs)]
-    ).strip()
+    lines = [values, *([f"uncertain: {drawn}"] if drawn else [])]
+    if options.is_brief:
+        return "\n".join([*lines, short_model_text(data.attrs)]).strip()
+    return "\n".join([*lines, model_text(data.attrs)]).strip()
 
 
 #: Models and their options in captions.
@@ -246,16 +291,29 @@ def model_text(attributes: Mapping[Any, Any]) -> str:
         _WORDS[model.name],
         *(_WORDS[value] for value in model.options.values() if value in _WORDS),
     ]
-    recorded = next((name for name in ("record", "suite") if name in attributes), None)
-    shaking = (
-        f"{recorded} {plain(attributes[recorded])}"
-        if recorded
-        else WAVEFORMS.from_attributes(attributes)
-    )
-    if "record_accepted" in attributes:
-        shaking = f"{shaking}\naccepted: {plain(attributes['record_accepted'])}"
     inputs = [plain(attributes["friction_inputs"])] if "friction_inputs" in attributes else []
-    return "\n".join([*inputs, f"{', '.join(words)}; {shaking}"])
+    return "\n".join([*inputs, f"{', '.join(words)}; {_shaking_text(attributes)}"])
+
+
+def short_model_text(attributes: Mapping[Any, Any]) -> str:
+    """Name the model, its shaking and the estimated inputs, on one line."""
+    model = _WORDS[MODELS.from_attributes(attributes).name]
+    # "Üy by Coulomb, λ by Eq. 6: estimated": the symbols alone
+    inputs = re.sub(r" by (Coulomb|Eqs?\. [\d–]+)", "", str(attributes.get("friction_inputs", "")))
+    inputs = plain(inputs.replace(": estimated", " estimated"))
+    shaking = _shaking_text(attributes)
+    if "suite" in attributes:
+        shaking = f"suite of {attributes.get('motions', '?')} motions"
+    return f"{model}, {shaking}{f'; {inputs}' if inputs else ''}"
+
+
+def _shaking_text(attributes: Mapping[Any, Any]) -> str:
+    recorded = next((name for name in ("record", "suite") if name in attributes), None)
+    if recorded is None:
+        return str(WAVEFORMS.from_attributes(attributes))
+    accepted = attributes.get("record_accepted")
+    more = f"\naccepted: {plain(accepted)}" if accepted else ""
+    return f"{recorded} {plain(attributes[recorded])}{more}"
 
 
 def drawn_text(attributes: Mapping[Any, Any]) -> str:

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from slipsweep.charts import solved, statistics, style
+from slipsweep.charts import equations, solved, statistics, style
 from slipsweep.charts.sheet import Panel, Sheet, log_axis, log_ticks, plot_curve
 from slipsweep.charts.slices import Result
 from slipsweep.charts.style import Floats, Look, Options
@@ -64,6 +64,7 @@ def motions(result: Result, options: Options) -> Figure:
             sheet.legend[f"median, {style.NEWMARK}"] = panel.axes.plot(
                 panel.xs, median, gid="newmark", **_NEWMARK
             )[0]
+        equations.draw_over_axis(sheet, panel)
     _note_suite(sheet, "Median and band are of", "they lie below the logarithmic axis")
     sheet.note_left_out(solved.DISPLACEMENT)
     _note_cautions(sheet)
@@ -99,15 +100,20 @@ def intensity(result: Result, options: Options) -> Figure:
                 own: Look = {"gid": name, "linestyle": "", **look}
                 (sheet.legend[name],) = panel.axes.plot(xs[which], heights[which], **own)
         _draw_regression(sheet, panel, xs, ys)
-    sheet.notes.append(
-        "Regression of ln u on the logarithm of the abscissa, of all motions that slide; "
-        "σ: standard deviation of ln u about it."
+        equations.draw_over_measure(sheet, panel, measure, xs)
+    left_out = _sliding_left_out(sheet)
+    but = f", but for {left_out} left out" if left_out else ""
+    sheet.note(
+        f"Regression of ln u on the logarithm of the abscissa, of all motions that slide{but}; "
+        "σ: standard deviation of ln u about it.",
+        "σ: standard deviation of ln u about the regression.",
     )
-    sheet.notes.append(
-        "Abscissa: of the motion as it shakes the block, with its factor and time scale."
+    sheet.note(
+        "Abscissa: of the motion as it shakes the block, with its factor and time scale.",
+        short="",
     )
     if missing := np.count_nonzero(~np.isfinite(places)):
-        sheet.notes.append(f"{missing} of {places.size} have no {text}: the samples resolve none.")
+        sheet.note(f"{missing} of {places.size} have no {text}: the samples resolve none.")
     _note_suite(sheet, "Drawn are", "they are marked at the lower edge")
     sheet.note_left_out(solved.DISPLACEMENT)
     return sheet.done()
@@ -178,7 +184,7 @@ def _sheet(
     rounded = without_rounding(sheet.data[solved.DISPLACEMENT])
     sheet.data[solved.DISPLACEMENT] = rounded
     if not rounded.equals(given):
-        sheet.notes.append("Displacements below 10⁻¹² m count as zero.")
+        sheet.note("Displacements below 10⁻¹² m count as zero.")
     return sheet
 
 
@@ -233,6 +239,13 @@ def _scattered(panel: Panel, measure: str) -> Floats:
     return every[:, np.isfinite(every[1])]
 
 
+def _sliding_left_out(sheet: Sheet) -> int:
+    """Number of motions of all panels that slide and are not drawn, as their displacements are unreliable."""
+    moved = sheet.data[solved.DISPLACEMENT]
+    drawn = solved.reliable(sheet.data, solved.DISPLACEMENT, sheet.options.show_cautions)
+    return int((moved.notnull() & (moved != 0.0) & drawn.isnull()).sum())
+
+
 def _draw_regression(sheet: Sheet, panel: Panel, xs: Floats, ys: Floats) -> None:
     """The line of ln u = a + b ln(measure), its R² and scatter over the panel."""
     slid = (ys > 0) & (xs > 0) & np.isfinite(xs)
@@ -265,13 +278,12 @@ def _note_suite(sheet: Sheet, what: str, zeros_are: str = "") -> None:
         if most
         else "all have a value"
     )
-    sheet.notes.append(f"{what} {suite_text(sheet.data[solved.DISPLACEMENT].sizes)}; {left}.")
+    sheet.note(f"{what} {suite_text(sheet.data[solved.DISPLACEMENT].sizes)}; {left}.")
     zeros = (found["zero_probability"].fillna(0.0) * found["value_count"]).values
     if zeros_are and zeros.max() > 0:
         count = found["value_count"].values.flat[np.argmax(zeros)]
-        sheet.notes.append(
-            f"Zero displacement: {up_to}{round(zeros.max())} of {count}; {zeros_are}."
-        )
+        shown = f"Zero displacement: {up_to}{round(zeros.max())} of {count}"
+        sheet.note(f"{shown}; {zeros_are}.", f"{shown}.")
 
 
 def _note_cautions(sheet: Sheet) -> None:
@@ -279,12 +291,11 @@ def _note_cautions(sheet: Sheet) -> None:
     shares = {
         flag: float(solved.has_flags(sheet.data["validity"], flag).mean()) for flag in CAUTIONS
     }
-    texts = [
-        f"{style.flag_name(flag)} {solved.percent(share)}"
-        for flag, share in shares.items()
-        if share
-    ]
-    if texts:
-        sheet.notes.append(
-            f"Statistics are of all values, also those with a caution: {', '.join(texts)}."
+    seen = {flag: solved.percent(share) for flag, share in shares.items() if share}
+    if seen:
+        names = ", ".join(f"{style.flag_name(flag)} {share}" for flag, share in seen.items())
+        words = ", ".join(f"{style.FLAG_TEXT[flag]} {share}" for flag, share in seen.items())
+        sheet.note(
+            f"Statistics are of all values, also those with a caution: {names}.",
+            f"With a caution: {words}.",
         )

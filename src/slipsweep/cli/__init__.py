@@ -7,9 +7,10 @@ that `slipsweep --help` is there at once.
 
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TextIO
 
 import typer
 from typer.core import TyperGroup
@@ -17,8 +18,9 @@ from typer.core import TyperGroup
 from slipsweep._version import __version__
 from slipsweep.cli import calibrate, chart, hazard, info, limit, run, simulate
 from slipsweep.cli.common import echo
+from slipsweep.cli.letters import SPELL
 from slipsweep.cli.options import app
-from slipsweep.errors import InputError, RunError
+from slipsweep.errors import InputError, RunError, RunWarning
 
 
 class _Commands(TyperGroup):
@@ -53,9 +55,32 @@ def _message(error: Exception) -> str:
     return str(error)
 
 
+def _show_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """Print a warning of the program in one line; those of libraries as Python does."""
+    if issubclass(category, RunWarning):
+        echo(f"slipsweep: warning: {message}", err=True)
+    else:
+        sys.stderr.write(warnings.formatwarning(message, category, filename, lineno, line))
+
+
 def _show_version(requested: bool) -> None:
     if requested:
         echo(f"slipsweep {__version__}")
+        raise typer.Exit
+
+
+def _show_versions(requested: bool) -> None:
+    if requested:
+        from slipsweep.cli import versions
+
+        echo(*versions.lines())
         raise typer.Exit
 
 
@@ -65,6 +90,15 @@ def _options(
         bool,
         typer.Option(
             "--version", callback=_show_version, is_eager=True, help="Show the version and exit."
+        ),
+    ] = False,
+    versions: Annotated[
+        bool,
+        typer.Option(
+            "--versions",
+            callback=_show_versions,
+            is_eager=True,
+            help="Show all versions, for a report of a fault, and exit.",
         ),
     ] = False,
 ) -> None:
@@ -87,12 +121,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.environ["HOME"] = os.devnull
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="backslashreplace")  # an alphabet without λ fails no command
-    try:
-        app(
-            list(sys.argv[1:] if arguments is None else arguments) or ["--help"],
-            prog_name="slipsweep",
-        )
-    except SystemExit as end:
-        return end.code if isinstance(end.code, int) else 0
+            stream.reconfigure(errors=SPELL)  # an alphabet without λ fails no command
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    with warnings.catch_warnings():
+        warnings.showwarning = _show_warning
+        try:
+            app(words or ["--help"], prog_name="slipsweep")
+        except SystemExit as end:
+            return end.code if isinstance(end.code, int) else 0
     return 0

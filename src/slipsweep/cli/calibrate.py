@@ -209,4 +209,5 @@ def _echo_parameters(table: "xr.Dataset") -> None:
 
 
 def _text(table: "pd.DataFrame", **options: bool) -> str:
-    return table.to_string(**options, float_format="{:.4g}".format, na_rep="-")
+    text: str = table.to_string(**options, float_format="{:.4g}".format, na_rep="-")
+    return text

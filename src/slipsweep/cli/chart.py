@@ -53,6 +53,13 @@ def chart(
     ] = False,
     width: Annotated[Text, LOOK("Width of the figure: 90mm, 3.5inch.", "LENGTH")] = None,
     grey: Annotated[bool, LOOK("Draw without colour.", None, "--grey")] = False,
+    title: Annotated[Text, LOOK("A title of your own.", "TEXT")] = None,
+    caption: Annotated[
+        Literal["full", "short"] | None,
+        LOOK("Caption: in full, or short (default: short below 127 mm)."),
+    ] = None,
+    equations: options.Equations = None,
+    magnitude: options.Magnitude = None,
     output: Annotated[
         options.Paths,
         written(
@@ -64,6 +71,7 @@ def chart(
     """Draw design charts of a result."""
     given = output or []
     outputs.check_endings(given, FIGURES)
+    beside = options.compared(equations, magnitude)
 
     from slipsweep.charts import kinds, slices, style
     from slipsweep.files import opening, selection
@@ -77,7 +85,20 @@ def chart(
         result = slices.Result(data, file)
         axes = selection.own_names(data, typed)
         look = style.Options(
-            x, y, axes, across, variable, heights, units, show_cautions, width, grey
+            x,
+            y,
+            axes,
+            across,
+            variable,
+            heights,
+            units,
+            show_cautions,
+            width,
+            grey,
+            title,
+            caption,
+            equations=beside,
+            magnitude=magnitude,
         )
         result.places(look.at)
         chosen = requested or kinds.fitting(result, look)
@@ -129,7 +150,7 @@ def explore(
     ] = "10MB",
     quiet: options.Quiet = False,
 ) -> None:
-    """Write a page for the browser in which to explore a result."""
+    """Write a page for the browser in which to explore a result (extra \\[explore])."""
     from slipsweep.explore import page as pages
     from slipsweep.grid.resources import parse_size, size_text
 

@@ -2,12 +2,10 @@
 
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
-
-import typer
 
 from slipsweep.cli.options import Large, displacements
 from slipsweep.errors import InputError
@@ -22,6 +20,9 @@ if TYPE_CHECKING:
     from slipsweep.files.storing import Place
     from slipsweep.grid.tally import Tally
     from slipsweep.motion.records import Record
+
+#: Attribute of a file that says what no design must rest on, a line for each reason.
+UNSOUND = "unsound"
 
 #: Endings of figures.
 FIGURES = (".png", ".svg", ".pdf")
@@ -56,8 +57,17 @@ def write_outputs(
                 kinds.save(figure, temporary, path.suffix)
 
 
-def run_job(job: "Job", path: "Place", large: Large, unit: str = "cells") -> "Report":
-    """Solve and write what a command computes, in chunks if need be."""
+def run_job(
+    job: "Job",
+    path: "Place",
+    large: Large,
+    unit: str = "cells",
+    remarks: "Callable[[xr.Dataset], Mapping[str, str]]" = lambda results: {},
+) -> "Report":
+    """Solve and write what a command computes, in chunks if need be.
+
+    `remarks` makes attributes of the results, which go into the file.
+    """
     from slipsweep.files import running
     from slipsweep.grid.resources import parse_size
 
@@ -68,7 +78,8 @@ def run_job(job: "Job", path: "Place", large: Large, unit: str = "cells") -> "Re
     given = {name: value for name, value in vars(large).items() if name != "quiet"}
     given["memory"] = None if large.memory is None else parse_size("--memory", large.memory)
     with progress_bar(job.plan.cells, large.quiet, unit) as progress:
-        report = running.run(job, path, command=typed_command(), progress=progress, **given)
+        given |= {"progress": progress, "remarks": remarks}
+        report = running.run(job, path, command=typed_command(), **given)
     if report.found and not large.quiet:
         echo(f"{path}: complete already, by the same sweep; nothing was computed")
     return report
@@ -127,7 +138,8 @@ def echo(*texts: object, err: bool = False) -> None:
         shown = (
             c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text
         )
-        typer.echo("".join(shown), err=err)
+        # typer's would write UTF-8 to a terminal that has ASCII only
+        print("".join(shown), file=sys.stderr if err else sys.stdout, flush=True)
 
 
 def range_text(name: str, ends: Sequence[float], g: float) -> str:
@@ -135,6 +147,11 @@ def range_text(name: str, ends: Sequence[float], g: float) -> str:
     units = variables.PARAMETERS[name]["units"].replace("m s-2", "m/s2")
     in_g = f" ({' to '.join(f'{end / g:.4g}' for end in ends)} g)" if units == "m/s2" else ""
     return f"{' to '.join(f'{end:.6g}' for end in ends)}{'' if units == '1' else f' {units}'}{in_g}"
+
+
+def echo_unsound(table: "xr.Dataset") -> None:
+    """Print what the file of a result says of it that no design must rest on."""
+    echo(*(f"{UNSOUND}: {text}" for text in str(table.attrs.get(UNSOUND, "")).splitlines()))
 
 
 def echo_tally(tally: "Tally") -> None:
@@ -149,7 +166,11 @@ def echo_tally(tally: "Tally") -> None:
         )
     if tally.flags is not None:
         seen = variables.Validity(sum(flag for flag, count in tally.flags.items() if count))
-        echo("flags (validity):" if seen else "flags (validity): none")
+        echo("flags (validity):" if seen or tally.unflagged else "flags (validity): none")
+        if tally.unflagged:
+            echo(
+                f"  not known              {tally.share(tally.unflagged):9.2%}  {variables.UNFLAGGED_TEXT}"
+            )
         for kind in variables.FlagKind:
             flags = seen & variables.flags_of(kind)
             echo(*([f"  {kind}: {variables.FLAG_KIND_TEXT[kind]}"] if flags else ()))

@@ -1,7 +1,7 @@
 """`slipsweep hazard`: the mean annual rate at which a displacement is exceeded."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from slipsweep.cli import common, options
 from slipsweep.cli.common import FIGURES, echo
@@ -9,8 +9,14 @@ from slipsweep.cli.options import command, written
 from slipsweep.errors import InputError
 from slipsweep.files import outputs
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 #: What is needed of a result.
 _NEEDED = ("permanent_displacement", "validity", "exceedance_probability", "valueless_share")
+
+#: Of the accelerations of published equations every so many goes to a fragility of OpenQuake.
+_EVERY = 8
 
 #: The part of a rate that is worth a sentence.
 _MUCH = 0.05
@@ -21,6 +27,7 @@ HAZARD = options.Panel("Hazard")
 @command(
     "Compute",
     "slipsweep hazard suite.nc --curve hazard.csv -d 50mm -d 30cm -o hazard.png -o fragility.xml",
+    "slipsweep hazard suite.nc --curve hazard.csv -d 50mm --equations jibson-2007",
 )
 def hazard(
     file: Annotated[
@@ -37,7 +44,13 @@ def hazard(
     site: Annotated[
         int | None, HAZARD("Which site of an OpenQuake file with several, from 1.", "N")
     ] = None,
+    unstated: Annotated[
+        Literal["refuse", "accept"],
+        HAZARD("A curve that does not say PGA, or annual: refused, or taken as such."),
+    ] = "refuse",
     at: options.At = None,
+    equations: options.Equations = None,
+    magnitude: options.Magnitude = None,
     output: Annotated[
         options.Paths,
         written(
@@ -50,7 +63,7 @@ def hazard(
     """Compute the mean annual rate of exceeding a displacement.
 
     From a hazard curve and the fragility under a suite of recorded motions, under uncertain inputs,
-    or under both.
+    or under both.  --equations takes published equations in place of the suite.
     """
     import xarray as xr
 
@@ -60,9 +73,11 @@ def hazard(
         displacement_hazard,
         fragility,
         openquake_fragility,
+        published_fragility,
         read_hazard_curve,
     )
 
+    beside = options.compared(equations, magnitude) or None
     paths = outputs.check_outputs(
         output, overwrite, reads=[file, curve], endings=(*FIGURES, ".xml")
     )
@@ -78,18 +93,25 @@ def hazard(
     result = chosen.squeeze([name for name in typed if name in chosen.sizes])
     g = float(table.attrs["g"])
     lengths = options.displacements(displacement, g)
-    given = read_hazard_curve(curve, g, site)
-    rates = displacement_hazard(result, given, lengths)
+    given = read_hazard_curve(curve, g, site, unstated)
+    rates = displacement_hazard(result, given, lengths, equations=beside, magnitude=magnitude)
     drawn = rates
     if any(path.suffix in FIGURES for path in paths):
         from slipsweep.charts.limits import drawn_thresholds
 
         marked = rates["threshold"].values
         more = None if "exceedance_probability" in result else drawn_thresholds(result, marked)
-        drawn = displacement_hazard(result, given, more).assign_attrs(marked=marked)
-    common.write_outputs(
-        paths, overwrite, drawn, xml=lambda: openquake_fragility(fragility(result, lengths))
-    )
+        drawn = displacement_hazard(
+            result, given, more, equations=beside, magnitude=magnitude
+        ).assign_attrs(marked=marked)
+
+    def fragility_text() -> str:
+        if beside is None:
+            return openquake_fragility(fragility(result, lengths))
+        fitted = published_fragility(result, given, beside, lengths, magnitude)
+        return openquake_fragility(fitted.isel(amplitude=slice(None, None, _EVERY)))
+
+    common.write_outputs(paths, overwrite, drawn, xml=fragility_text)
     if quiet:
         return
     low, high = (float(one) / g for one in rates.attrs["amplitude_range"])
@@ -97,37 +119,18 @@ def hazard(
     # P is known between these, and the rate of what lies above and below is not
     first = max(low, start)
     last = min(high, end)
-    echo(f"P(u > d | PGA): share over {rates.attrs['suite_dimensions'].replace(' ', ' and ')}")
-    echo(
-        f"amplitudes of the result {low:.4g} to {high:.4g} g, hazard curve {start:.4g} to {end:.4g} g"
-    )
+    if beside is None:
+        pooled = rates.attrs["suite_dimensions"].replace(" ", " and ")
+        echo(f"P(u > d | PGA): share over {pooled}")
+        ends = f"amplitudes of the result {low:.4g} to {high:.4g} g"
+        echo(f"{ends}, hazard curve {start:.4g} to {end:.4g} g")
+    else:
+        echo(f"P(u > d | PGA): by published equations, hazard curve {start:.4g} to {end:.4g} g")
     values = {
         name: rates[name] for name in typed if name in rates.coords and name not in rates.sizes
     }
     echo(*(f"{name} = {values_text(value)}" for name, value in values.items()))
     rate, held, omitted = (rates[name] for name in ("annual_rate", "held_rate", "omitted_rate"))
-    axis = "the axis amplitude of the sweep" if high < end else "the hazard curve"
-    missing = rates["valueless_share"]
-    what = "samples" if "samples" in rates.attrs["suite_dimensions"] else "motions"
-    unstable = (
-        "; those that are statically unstable count as exceeding" if what == "samples" else ""
-    )
-    notes = {
-        f"up to {missing.max():.1%} of the {what} have no value at an amplitude: left out of P{unstable}": missing
-        > 0.0,
-        "without an annual rate: fewer than two amplitudes have a value": rate.isnull(),
-        "annual rate 0: the displacement is not exceeded at any amplitude of the result": rate
-        == 0.0,
-        f"above {last:.4g} g P(u > d) is taken as it is there: to compute it, extend {axis}": held
-        > _MUCH * rate,
-        f"below {first:.4g} g nothing is counted: to compute it, begin the axis amplitude lower": omitted
-        > _MUCH * rate,
-        f"the hazard curve begins at {start:.4g} g, where displacements are exceeded already: the rates are too small "
-        "by an unknown part; begin the curve lower": omitted.isnull() & rate.notnull(),
-        "P(u > d) grows much from one amplitude to the next: the rates may be wrong by the factors above; put more "
-        "values on the axis amplitude": (rates["upper_rate"] > 2.0 * rates["lower_rate"])
-        & (held < rate),
-    }
     exceeded = rate.where(rate > 0.0)
     columns = {
         "annual rate": rate,
@@ -137,6 +140,58 @@ def hazard(
         f"above {last:.3g} g": held / exceeded,
         f"below {first:.3g} g": omitted / exceeded,
     }
-    table = xr.Dataset(columns).rename(threshold="d (m)").to_dataframe()[[*columns]]
+    if beside is not None:
+        columns["outside its range"] = rates["outside_rate"] / exceeded
+    order = [*(dim for dim in rate.dims if dim != "threshold"), "d (m)"]
+    table = xr.Dataset(columns).rename(threshold="d (m)").to_dataframe(order)[[*columns]]
     echo(table.to_string(float_format="{:.4g}".format, na_rep="-"))
-    echo(*(text for text, holds in notes.items() if holds.any()), *paths)
+    notes = {
+        f"the hazard curve begins at {start:.4g} g, where displacements are exceeded already: the "
+        "rates are too small by an unknown part; begin the curve lower": omitted.isnull()
+        & rate.notnull(),
+    }
+    if beside is None:
+        notes = _suite_notes(rates, first, last, "sweep" if high < end else "curve") | notes
+    else:
+        notes |= _published_notes(rates, last)
+    echo(*(text for text, holds in notes.items() if holds.any()))
+    echo(*rates.attrs.get("conditions", "").splitlines(), *paths)
+
+
+def _suite_notes(
+    rates: "xr.Dataset", first: float, last: float, first_end: str
+) -> "dict[str, xr.DataArray]":
+    """Sentences about the rates of a suite or of samples, and where they hold."""
+    rate, held, omitted = (rates[name] for name in ("annual_rate", "held_rate", "omitted_rate"))
+    axis = "the axis amplitude of the sweep" if first_end == "sweep" else "the hazard curve"
+    missing = rates["valueless_share"]
+    what = "samples" if "samples" in rates.attrs["suite_dimensions"] else "motions"
+    unstable = (
+        "; those that are statically unstable count as exceeding" if what == "samples" else ""
+    )
+    return {
+        f"up to {missing.max():.1%} of the {what} have no value at an amplitude: left out of P{unstable}": missing
+        > 0.0,
+        "without an annual rate: fewer than two amplitudes have a value": rate.isnull(),
+        "annual rate 0: the displacement is not exceeded at any amplitude of the result": rate
+        == 0.0,
+        f"above {last:.4g} g P(u > d) is taken as it is there: to compute it, extend {axis}": held
+        > _MUCH * rate,
+        f"below {first:.4g} g nothing is counted: to compute it, begin the axis amplitude lower": omitted
+        > _MUCH * rate,
+        "P(u > d) grows much from one amplitude to the next: the rates may be wrong by the factors above; put more "
+        "values on the axis amplitude": (rates["upper_rate"] > 2.0 * rates["lower_rate"])
+        & (held < rate),
+    }
+
+
+def _published_notes(rates: "xr.Dataset", last: float) -> "dict[str, xr.DataArray]":
+    """Sentences about the rates of published equations, and where they hold."""
+    rate, held, outside = (rates[name] for name in ("annual_rate", "held_rate", "outside_rate"))
+    return {
+        "without an annual rate: the block slides under its own weight": rate.isnull(),
+        f"above {last:.4g} g P(u > d) is taken as it is there: to compute it, extend the hazard "
+        "curve": held > _MUCH * rate,
+        "outside its range: the part of the rate for which an equation is extrapolated": outside
+        > 0.0,
+    }

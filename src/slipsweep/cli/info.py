@@ -18,17 +18,23 @@ TABLE = options.Panel("Table")
     "Read results",
     "slipsweep info design_chart.nc",
     "slipsweep info suite.nc -d 50mm --at mu_s=0.4",
+    "slipsweep info suite.nc -d 50mm --at mu_s=0.4 --equations jibson-2007",
 )
 def info(
     file: options.Result,
     displacement: Annotated[Texts, options.LENGTH] = None,
     at: options.At = None,
+    equations: options.Equations = None,
+    magnitude: options.Magnitude = None,
 ) -> None:
     """Show what a result holds, how it was made, its shares of flags, and the statistics of a suite."""
+    from slipsweep.charts import solved
     from slipsweep.files import jobs, motions, opening, selection, storing
     from slipsweep.grid.tally import tally_of
     from slipsweep.motion.records import Record
+    from slipsweep.motion.suites import Suite
 
+    beside = options.compared(equations, magnitude)
     table = opening.read_result(file)
     echo(f"{Path(file)}  {size_text(storing.nbytes_of(opening.place_of(file)))}")
     echo(
@@ -44,19 +50,31 @@ def info(
         echo(f"record: {recorded.summary()}")
     if rows := opening.motions_text(table):
         echo("motions, as recorded:", *(f"  {row}" for row in rows))
+    if isinstance(recorded, Suite):
+        echo(*recorded.cautions())
     try:
         common.echo_tally(tally_of(table))
     except InputError as error:
         echo(f"modes and flags not counted: {error}")
-    if displacement and table.sizes.get("motion", 1) < 2 and "displacement_quantile" not in table:
+    common.echo_unsound(table)
+    if slides_back := solved.slides_back_text(table, recorded):
+        echo(f"caution: {slides_back}")
+    has_statistics = table.sizes.get("motion", 1) > 1 or "displacement_quantile" in table
+    if displacement and not (has_statistics or beside):
         raise InputError(
             f"{file}: --displacement: is for results of a suite of motions, or of uncertain inputs"
         )
     chosen = selection.selected(table, file, options.cuts(at), ("motion", "quantile", "threshold"))
     common.echo_suite(chosen, most=100, typed=displacement)
+    if beside:
+        from slipsweep.studies.published_statistics import published_lines
+
+        g = float(table.attrs["g"])
+        lengths = options.displacements(displacement, g) if displacement else None
+        echo(*published_lines(chosen, beside, magnitude, lengths))
     for name, value in table.attrs.items():
         lines = str(value).splitlines()
-        if name != jobs.RUN:
+        if name not in (jobs.RUN, common.UNSOUND):
             echo(
                 f"{name}: {lines[0]}".rstrip()
                 if len(lines) == 1
@@ -69,10 +87,13 @@ def info(
     "slipsweep export paper.nc -o paper.csv --words",
     "slipsweep export design_chart.nc -o t.parquet --at theta=5 --at amplitude=0.1g,0.2g,0.3g",
     "slipsweep export design_chart.nc -o t.xlsx --at theta=5 --at mu_s=0.4 --columns frequency",
+    "slipsweep export suite.nc -o t.xlsx --at mu_s=0.4 --equations jibson-2007",
 )
 def export(
     file: options.Result,
-    output: Annotated[Path, options.written("Write .csv, .parquet, .xlsx or .xml.")],
+    output: Annotated[
+        Path, options.written("Write .csv, .parquet, .xlsx (extras [parquet], [xlsx]) or .xml.")
+    ],
     variables: Annotated[
         Texts, TABLE("Result to export (default: all); may be repeated.", "NAME", "--variable")
     ] = None,
@@ -87,6 +108,8 @@ def export(
     columns: Annotated[
         Text, TABLE("Axis whose values become columns; one table per result.", "NAME")
     ] = None,
+    equations: options.Equations = None,
+    magnitude: options.Magnitude = None,
     overwrite: options.Overwrite = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -120,6 +143,8 @@ def export(
         at=options.cuts(at),
         rows=rows.split(",") if rows else (),
         columns=columns,
+        equations=options.compared(equations, magnitude),
+        magnitude=magnitude,
         overwrite=overwrite,
         progress=functools.partial(common.progress_bar, quiet=quiet, unit="rows"),
     )

@@ -74,6 +74,12 @@ LENGTH = Panel("Displacement")(
     "--displacement",
     "-d",
 )
+PUBLISHED = Panel("Published equations")
+_BESIDE = "Published equations beside: jibson-2007,bray-travasarou-2007 (docs/published.md)."
+Equations = Annotated[Text, PUBLISHED(_BESIDE, "NAME,...")]
+Magnitude = Annotated[
+    float | None, PUBLISHED("Moment magnitude, for the equations that need it.", "M")
+]
 _AT = (
     "Values of an axis: theta=12, amplitude=0.1g,0.2g, case=LABEL (default: all); may be repeated."
 )
@@ -124,7 +130,19 @@ def displacements(texts: Sequence[str], g: float) -> list[float]:
                 f"--displacement = {text}: without a unit that is {length:g} m; {units}"
             )
         found.add(length)
-    return check_values("displacement", sorted(found), "--displacement").tolist()
+    values = check_values("displacement", sorted(found), "--displacement")
+    return [float(value) for value in values]
+
+
+def compared(equations: str | None, magnitude: float | None) -> tuple[str, ...]:
+    """Return the published equations that were typed (InputError: none such, a magnitude alone)."""
+    if magnitude is not None and equations is None:
+        raise InputError(f"--magnitude {magnitude:g}: only with --equations")
+    if equations is None:
+        return ()
+    from slipsweep.published import check_equations  # here: it needs NumPy, and `--help` does not
+
+    return check_equations(equations)
 
 
 def in_own_units(typed: Mapping[str, Any], g: float) -> dict[str, Any]:
@@ -156,6 +174,7 @@ def command(task: str, *examples: str) -> Callable[[Callable[..., None]], Callab
     def add(function: Callable[..., None]) -> Callable[..., None]:
         @functools.wraps(function, assigned=("__module__", "__name__", "__doc__"))
         def run(**typed: Any) -> None:
+            _check_named(typed.get("output"))
             function(**{name: _made(typed, choice) for name, choice in choices.items()}, **typed)
 
         given = inspect.signature(function).parameters
@@ -172,6 +191,13 @@ def command(task: str, *examples: str) -> Callable[[Callable[..., None]], Callab
         return function
 
     return add
+
+
+def _check_named(output: Any) -> None:
+    """Refuse outputs without a name."""
+    for path in output if isinstance(output, list) else [output]:
+        if path is not None and str(path) in ("", "."):
+            raise InputError("--output: must be the name of a file; is empty or the current folder")
 
 
 def _made(given: dict[str, Any], choice: Family[Any] | type[Any]) -> Any:

@@ -5,7 +5,7 @@ import time
 import tomllib
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from slipsweep.cli import common, options
 from slipsweep.cli.common import echo, range_text
@@ -14,6 +14,14 @@ from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files import outputs
 from slipsweep.model import variables
 from slipsweep.model.options import SOLVERS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from slipsweep.files.spec import SweepSpec
+
+#: Factor on a recorded acceleration above which a motion is far from what was recorded.
+_LARGE_FACTOR = 4.0
 
 
 @options.command("Start", "slipsweep example", "slipsweep example paper")
@@ -87,10 +95,6 @@ def run(
     from slipsweep.jit import compiling
 
     checked = spec.load(sweep)
-    if solver is not None and checked.recorded is not None:
-        raise InputError(
-            f"--solver {solver}: not allowed with recorded motions, to which the response is exact"
-        )
     if (
         solver is not None and solver != checked.solver.name
     ):  # the same one keeps the options of the sweep file
@@ -107,14 +111,23 @@ def run(
     sampling = checked.sampling
     job = jobs.sweep_job(checked)
     unit = "cells" if sampling is None else "samples"
-    report = common.run_job(job, path, large, unit)
+    judged = 0.0  # seconds
+
+    def remarks(results: "xr.Dataset") -> dict[str, str]:
+        nonlocal judged
+        before = time.perf_counter()
+        texts = solved.unsound_texts(results)
+        judged += time.perf_counter() - before
+        return {common.UNSOUND: "\n".join(texts)} if texts else {}
+
+    report = common.run_job(job, path, large, unit, remarks)
     if large.quiet:
         return
     template = job.plan.template()
     if not report.found:
         cells = job.plan.cells
         grid = grid_text(job.plan.sizes) or "no axes"
-        passed = time.perf_counter() - started
+        passed = time.perf_counter() - started - judged
         once = compiling.seconds - compiled_before
         compiled = f" ({once:.2f} s to compile, once)" if once > 0.0 else ""
         took = f"in {passed:.2f} s{compiled}, {cells / max(passed - once, 1e-9):.3g} {unit}/s"
@@ -137,11 +150,34 @@ def run(
             echo(f"  {parameter:<24}{range_text(str(parameter), ends, checked.model.g)}")
     if checked.recorded is not None:
         echo(checked.recorded.summary())
+        echo(*filter(None, [_scaling_caution(checked)]))
     if "duplicate_motions" in template.attrs:
         echo(f"the same motion under several labels: {template.attrs['duplicate_motions']}")
     common.echo_tally(report.tally)
     result = opening.read_result(report.path)
     echo(*filter(None, [solved.why_nothing_slides(template, report.tally)]))
-    echo(*(f"unsound: {text}" for text in solved.unsound_texts(result)))
+    common.echo_unsound(result)
+    if slides_back := solved.slides_back_text(result, checked.recorded):
+        echo(f"caution: {slides_back}")
     common.echo_suite(result, most=20)
     echo(f"{report.path}  {size_text(storing.nbytes_of(report.path))}")
+
+
+def _scaling_caution(spec: "SweepSpec") -> str | None:
+    """A line on recorded motions that are scaled by large factors; None where none is."""
+    from slipsweep.grid.inputs import Inputs
+    from slipsweep.grid.plans import plan_sweep
+
+    # the factor depends on these alone; a block has to be given, whichever it is
+    names = (*variables.STRENGTHS, "time_scale", "azimuth")
+    inputs = Inputs(theta=0.0, mu_s=1.0, **{name: getattr(spec.inputs, name) for name in names})
+    plan = plan_sweep(inputs, excitation=spec.excitation, variables=["motion_factor"])
+    factors = plan.solve()["motion_factor"]
+    largest = factors.max(set(factors.dims) - {"motion"})
+    if not (largest > _LARGE_FACTOR).any():
+        return None
+    scaled = f"scale factors above {_LARGE_FACTOR:g}, up to {largest.max().item():.3g}"
+    if "motion" in largest.dims:
+        labels = largest["motion"].values[largest.values > _LARGE_FACTOR]
+        scaled = f"{scaled}: {', '.join(labels)}"
+    return f"{scaled}; such motions have the frequencies and the duration of weaker earthquakes"

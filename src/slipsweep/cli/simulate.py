@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from slipsweep.cli import common, options
 from slipsweep.cli.common import echo
@@ -14,6 +14,9 @@ from slipsweep.model import variables
 from slipsweep.model.options import MODELS, Model
 from slipsweep.motion.reading import Reading
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -75,7 +78,7 @@ def simulate(
     model: Annotated[Model, MODELS],
     excitation: Annotated[Waveform | None, WAVEFORMS] = None,
     record: Annotated[
-        File, SHAKING("A recorded motion: CSV, PEER AT2, K-NET, COSMOS or ESM text.", "FILE")
+        File, SHAKING("A recorded motion: CSV, PEER AT2, K-NET, UNAM, COSMOS or ESM text.", "FILE")
     ] = None,
     reading: Annotated[Mapping[str, Any], Reading],
     output: Annotated[
@@ -95,10 +98,6 @@ def simulate(
         endings=(".nc", ".csv", *common.FIGURES),
     )
     with_unit = options.in_own_units(vars(typed), model.g)
-    taken = (
-        (name, common.range_text(name, (value,), model.g)) for name, value in with_unit.items()
-    )
-    taken_as = ", ".join(f"{name.replace('_', ' ')} {text}" for name, text in taken)
     for name in reading if record is None else ():
         raise InputError(
             f"{options.option_name(name)}: only with --record, the file of a recorded motion"
@@ -107,6 +106,7 @@ def simulate(
         raise InputError(
             f"--waveform {excitation.name}: not allowed with --record, which is the shaking itself"
         )
+    from slipsweep.charts import solved
     from slipsweep.motion.records import read_record
     from slipsweep.studies.history import simulate as simulated
 
@@ -120,12 +120,17 @@ def simulate(
         "excitation": recorded or excitation or WAVEFORMS.default,
     }
     table = simulated(**given, model=model, points_per_cycle=points)
+    taken_as = _taken_as(table, model.g)
     validity = variables.Validity(table["validity"].item())
     if flags := validity & variables.VALUELESS:
         why = "; ".join(f"{(flag.name or '').lower()}: {flag.text}" for flag in flags)
         raise RunError(f"the model gives no value: {why} ({taken_as})")
 
     table.attrs["title"] = "Time history of a sliding block"
+    continuous = table.get("sliding_mode", 0) == variables.SlidingMode.CONTINUOUS
+    if continuous and validity & variables.Validity.FRICTION_ESTIMATED:
+        unsound = "continuous sliding with estimated friction: not for design"
+        table.attrs[common.UNSOUND] = unsound
     titles = {
         name: f"{name} ({table[name].attrs['units']})"
         for name in ("time", *variables.HISTORY)
@@ -152,10 +157,22 @@ def simulate(
     counts = (name for name in variables.RECORD_COUNTS if name in table)
     echo(*(f"{name.replace('_', ' '):<24}{table[name].item()}" for name in counts))
     echo(f"inputs                  {table.attrs['friction_inputs']}")
+    if slides_back := solved.slides_back_text(table):
+        echo(f"{'caution':<24}{slides_back}")
     for kind in variables.FlagKind:
         flags = validity & variables.flags_of(kind)
         echo(*(f"{kind:<24}{(flag.name or '').lower()}: {flag.text}" for flag in flags))
-    continuous = table.get("sliding_mode", 0) == variables.SlidingMode.CONTINUOUS
-    if continuous and validity & variables.Validity.FRICTION_ESTIMATED:
-        echo("not for design          continuous sliding with estimated friction")
+    if common.UNSOUND in table.attrs:
+        echo(f"{common.UNSOUND:<24}{table.attrs[common.UNSOUND]}")
     echo(f"taken as                {taken_as}", *paths)
+
+
+def _taken_as(table: "xr.Dataset", g: float) -> str:
+    """Parameters of a time history with their units, also those that were not typed."""
+    texts = (
+        f"{name if name == 'mu_s' else name.replace('_', ' ')} "
+        f"{common.range_text(name, [table[name].item()], g)}"
+        for name in variables.PARAMETERS
+        if name in table.coords and table[name].ndim == 0
+    )
+    return ", ".join(texts)

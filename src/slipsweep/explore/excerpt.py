@@ -22,6 +22,7 @@ from slipsweep.model.variables import (
     STATISTIC_COORDINATES,
     STATISTICS,
     STRENGTHS,
+    UNFLAGGED_TEXT,
 )
 from slipsweep.studies.suite_statistics import suite_statistics
 
@@ -140,6 +141,8 @@ def read_excerpt(path: Path, cells: int) -> Excerpt:
             raise InputError(
                 f"{path}: {name}: lies along {beyond[0]}, along which no displacement does"
             )
+        if name == "validity" and table[name].isnull().any():
+            raise InputError(f"{path}: validity: {UNFLAGGED_TEXT}")
         table[name] = table[name].astype(SHOWN[name]).assign_attrs((STATISTICS | RESULTS)[name])
     labels = {dim: axis_labels(table, dim) for dim in lengths if dim not in PARAMETERS}
     table = xr.Dataset(

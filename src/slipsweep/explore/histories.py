@@ -11,11 +11,10 @@ from slipsweep.explore.excerpt import Excerpt, evenly, thinned_lengths
 from slipsweep.grid import engine, plans, solvers
 from slipsweep.grid.inputs import Inputs, Problem
 from slipsweep.kernels.block import Cell
-from slipsweep.kernels.exact import workspace_of
 from slipsweep.kernels.history import History, fill_history
 from slipsweep.model.options import MODELS, Cycle
 from slipsweep.model.variables import VALUELESS
-from slipsweep.motion.cutting import wave_of
+from slipsweep.motion.cutting import path_of_waveform
 from slipsweep.motion.waveforms import WAVEFORMS
 
 #: Points a cycle, and how many cycles at most.
@@ -95,13 +94,13 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
     plan = plans.plan_sweep(at_one, excitation=motion, model=model, variables=("validity",))
     has_values = (plan.solve()["validity"].variable.set_dims(left).values & VALUELESS) == 0
     problem = Problem(model, motion, Cycle())
-    wave = wave_of(motion)
+    path = path_of_waveform(motion)
     fields = engine.cell_inputs(problem, plan.coords)
     cells = {
         name: fields.get(name, xr.Variable((), math.nan)).set_dims(left).values
         for name in Cell._fields
     }
-    shared = solvers.options_of(problem, wants_peak=True), wave, workspace_of(wave, keeps_log=True)
+    options = solvers.options_of(problem, wants_peak=True)
     phase = np.linspace(0.0, 2.0 * math.pi * cycles, points)
     ground = np.zeros(points)
     values = np.zeros((*left.values(), len(_COLUMNS), points), np.int16)
@@ -109,7 +108,7 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
     samples = History(*np.empty((len(History._fields), points)))
     for at in np.ndindex(*left.values()):
         cell = Cell(*(float(one[at]) for one in cells.values()))
-        fill_history(cell, *shared, phase, samples)
+        fill_history(cell, options, path, phase, samples)
         columns = np.array([getattr(samples, name) for name in _COLUMNS])
         if has_values[at] and np.isfinite(columns).all():
             largest = np.abs(columns).max(axis=1)

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.charts.style import SYMBOLS, caption, is_acceleration, unit
-from slipsweep.errors import InputError
+from slipsweep.errors import InputError, check_extra
 from slipsweep.explore.excerpt import LAYERS, SHOWN, Excerpt, read_excerpt
 from slipsweep.explore.figures import decades, figures, label, scale_of
 from slipsweep.explore.histories import POINTS, Histories, compute_histories
@@ -95,6 +95,7 @@ def write_page(
     InputError: the file cannot be read or drawn, `size` is too small, Bokeh is not installed, or
     the output exists. RunError: writing failed.
     """
+    check_extra("explore", "explore", "bokeh", "jinja2")  # which Bokeh brings along
     from jinja2 import Environment, PackageLoader
     from markupsafe import Markup
 
@@ -156,13 +157,9 @@ def _digest(script: str) -> str:
 
 
 def _bokeh_script() -> str:
-    """Bokeh's library, which is not among what slipsweep always needs."""
-    try:
-        from bokeh.resources import Resources
-    except ImportError:
-        raise InputError(
-            'explore draws with Bokeh, which is not installed: pip install "slipsweep[explore]"'
-        ) from None
+    """Bokeh's library."""
+    from bokeh.resources import Resources
+
     return "\n".join(Resources(mode="inline", components=["bokeh"]).js_raw)
 
 
@@ -250,6 +247,7 @@ def _notes(excerpt: Excerpt, histories: Histories | None) -> list[str]:
         math.prod(sizes[dim] for dim in excerpt.lengths)
         for sizes in (excerpt.sizes, excerpt.lengths)
     )
+    unsound = str(excerpt.table.attrs.get("unsound", "")).splitlines()
     notes = [f"All {shown:,} cells of the file are in this page."]
     if shown < whole:
         notes = [
@@ -266,6 +264,7 @@ def _notes(excerpt: Excerpt, histories: Histories | None) -> list[str]:
             "Quantiles and probabilities are those of all motions and polarities that have a value, as "
             "slipsweep.suite_statistics gives them."
         )
+    notes += [f"Unsound: {text}." for text in unsound]
     if histories is None:
         notes.append(
             "The page has no time histories. They need harmonic motion without uncertain inputs, and space in the "

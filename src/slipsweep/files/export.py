@@ -1,6 +1,5 @@
 """Results as tables in files, by pandas: CSV, Parquet or a spreadsheet, in pieces of `CHUNK_CELLS`."""
 
-import importlib
 import io
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -14,14 +13,21 @@ import numpy as np
 import xarray as xr
 
 from slipsweep._version import __version__
-from slipsweep.errors import InputError, did_you_mean
+from slipsweep.errors import InputError, check_extra, did_you_mean
 from slipsweep.files.netcdf import WITH_MISSING
 from slipsweep.files.opening import read_result, result_names, values_text
 from slipsweep.files.outputs import check_endings, check_outputs, complete_or_absent
 from slipsweep.files.selection import axis_values, places_at
 from slipsweep.grid.chunks import grid_chunks
 from slipsweep.grid.tally import tally_of
-from slipsweep.model.variables import LIMIT_RESULTS, MOTION_FILES, PARAMETERS, RESULTS
+from slipsweep.model.variables import (
+    LIMIT_RESULTS,
+    MOTION_FILES,
+    PARAMETERS,
+    RESULTS,
+    UNFLAGGED_TEXT,
+)
+from slipsweep.studies.published_statistics import published_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,10 +35,10 @@ if TYPE_CHECKING:
 #: Cells read at a time; text of ten columns takes a hundred times as many bytes.
 CHUNK_CELLS = 2**18
 
-#: Endings of tables, the module that writes each, and the extra that brings it.
+#: Endings of tables, the package that writes each, and the extra that brings it.
 SUFFIXES = {
     ".csv": ("csv", ""),
-    ".parquet": ("pyarrow.parquet", "parquet"),
+    ".parquet": ("pyarrow", "parquet"),
     ".xlsx": ("xlsxwriter", "xlsx"),
 }
 
@@ -54,6 +60,8 @@ def export(
     at: Mapping[str, str] | None = None,
     rows: Sequence[str] = (),
     columns: str | None = None,
+    equations: str | Sequence[str] = (),
+    magnitude: float | None = None,
     overwrite: bool = False,
     progress: Callable[[int], AbstractContextManager[Callable[[int], None] | None]] | None = None,
 ) -> int:
@@ -63,12 +71,15 @@ def export(
     that none of them has are left out.  Sliding modes and flags are codes or `words`, accelerations
     in m/s² or `in_g`, that of the model. `at` says which values to keep of an axis, as
     `slipsweep.files.selection.places_at`.  With `columns`, the axis along the columns of a pivoted
-    table, `rows` are those along its rows.  `progress` is given how many rows there are, and yields
+    table, `rows` are those along its rows.  With `equations` a spreadsheet has a sheet of that
+    name: `published_table`.  `progress` is given how many rows there are, and yields
     what to call with a number of rows just written.  InputError: `source` is not slipsweep's,
     `path` cannot be written, a variable, axis or value is not in the file, a spreadsheet cannot
     hold the table, or the package is missing that writes it.
     """
     _check_format(path)
+    if equations and path.suffix != ".xlsx":
+        raise InputError(f"{path}: --equations: are a sheet of their own: must end in .xlsx")
     check_outputs([path], overwrite, reads=[Path(source)])
     with read_result(source) as opened:
         whole = _in_g(opened) if in_g else opened
@@ -109,28 +120,30 @@ def export(
                 f"{path}: a table with --columns has one result; choose it with --variable "
                 f"({', '.join(table.name for table in tables)}), or write .xlsx, which has a sheet for each"
             )
+        beside = None
+        if equations:
+            cut = opened.isel(places_at(opened, source, at or {}, dims))
+            beside = published_table(cut, equations, magnitude)
         total = sum(table.count for table in tables)
         with (
             progress(total) if progress else nullcontext() as told,
             complete_or_absent(path, overwrite) as temporary,
         ):
-            write = {".csv": _write_csv, ".parquet": _write_parquet, ".xlsx": _write_workbook}[
-                path.suffix
-            ]
-            write(temporary, tables, source, told or (lambda rows: None))
+            done = told or (lambda rows: None)
+            if path.suffix == ".xlsx":
+                _write_workbook(temporary, tables, source, done, beside)
+            else:
+                write = _write_csv if path.suffix == ".csv" else _write_parquet
+                write(temporary, tables, source, done)
     return total
 
 
 def _check_format(path: Path) -> None:
+    """Refuse a name that ends in no table's ending, or whose package is missing (InputError)."""
     check_endings([path], SUFFIXES)
-    module, extra = SUFFIXES[path.suffix]
-    try:
-        importlib.import_module(module)
-    except ImportError:
-        package = module.partition(".")[0]
-        raise InputError(
-            f"{path}: {path.suffix} needs {package}: pip install 'slipsweep[{extra}]', or give a name that ends in .csv"
-        ) from None
+    package, extra = SUFFIXES[path.suffix]
+    what = f"{path}: a table in {path.suffix}"
+    check_extra(what, extra, package, otherwise=", or give a name that ends in .csv")
 
 
 def _in_g(table: xr.Dataset) -> xr.Dataset:
@@ -231,9 +244,13 @@ class Table:
         """Values of a result as a table has them: codes that stand for no value missing, or in words."""
         import pandas as pd
 
-        if values.dtype.kind not in "iu":
+        if one.name == "validity" and values.dtype.kind == "f":  # some have lost their flags
+            missing = np.isnan(values)
+            values = np.where(missing, 0, values).astype(np.int16)
+        elif values.dtype.kind not in "iu":
             return values
-        missing = (values == -1) & (one.name in WITH_MISSING)
+        else:
+            missing = (values == -1) & (one.name in WITH_MISSING)
         about = (LIMIT_RESULTS | RESULTS).get(str(one.name), {}) | one.attrs
         if self.words and "flag_meanings" in about:
             return (
@@ -335,7 +352,11 @@ def _write_parquet(
 
 
 def _write_workbook(
-    path: Path, tables: list[Table], source: object, done: Callable[[int], None]
+    path: Path,
+    tables: list[Table],
+    source: object,
+    done: Callable[[int], None],
+    beside: "pd.DataFrame | None",
 ) -> None:
     import pandas as pd
 
@@ -361,6 +382,9 @@ def _write_workbook(
                 )
                 start += len(frame) + (start == 0)
                 done(len(frame))
+        if beside is not None:
+            beside.to_excel(book, sheet_name="equations", index=False)
+            book.sheets["equations"].set_column(0, beside.shape[1] - 1, 16)
         pd.DataFrame(_about(tables, source)).to_excel(
             book, sheet_name="about", header=False, index=False
         )
@@ -389,6 +413,9 @@ def _about(tables: list[Table], source: object) -> list[tuple[str, str]]:
                         f"{flag.kind}: {share}; {flag.text}",
                     )
                 )
+            if tally.unflagged:
+                share = f"{tally.share(tally.unflagged):.2%} of {tally.cells} cells"
+                rows.append(("flags not known", f"{share}; {UNFLAGGED_TEXT}"))
     for name, text in part.attrs.items():  # line by line: a cell does not hold a long text
         rows += [("" if at else str(name), line) for at, line in enumerate(str(text).splitlines())]
     return rows

@@ -45,6 +45,8 @@ _ABOUT: dict[str, dict[str, Any]] = {
     "record_accepted": {
         "long_name": "what is missing or implausible in a record, and was accepted"
     },
+    "record_caution": {"long_name": "what may be wrong with a record"},
+    "record_vertical": {"long_name": "what says that a record is a vertical component"},
     "record_baseline": {"long_name": "what was taken off a record"},
 }
 
@@ -125,12 +127,14 @@ def _suite(file: xr.Dataset, times: NDArray[Any], acceleration: NDArray[Any]) ->
         attrs = {key: texts[at] for key, texts in columns.items() if texts[at]}
         records.append(Record(*own, attrs.get("record", labels[at]), attrs))
     name = str(file.attrs.get("suite", "suite"))
+    text = str(file.attrs.get("left_out_vertical", ""))
+    left_out = tuple(text.split(", ")) if text else ()
     if _COMPONENT not in file:
-        return Suite(tuple(records), tuple(labels), name)
+        return Suite(tuple(records), tuple(labels), name, left_out)
     if counts.size % 2:
         raise InputError(f"{_COMPONENT}: {counts.size} components: must be two of each motion")
     pairs = tuple(Pair(*records[at : at + 2]) for at in range(0, len(records), 2))
-    return Suite(pairs, tuple(labels[::2]), name)
+    return Suite(pairs, tuple(labels[::2]), name, left_out)
 
 
 def digest_of(motion: Record | Suite) -> str:

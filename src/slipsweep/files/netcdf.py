@@ -55,10 +55,10 @@ def new_file(
     With a level of compression by zlib, which every build of the library has, results are in chunks
     of these lengths.
     """
-    found = table.assign_attrs(_attributes(table.attrs))
+    found = table.assign_attrs(attributes(table.attrs))
     encoding: dict[Any, dict[str, Any]] = {}
     for name, one in table.variables.items():
-        found[name].attrs = _attributes(one.attrs, one.dtype)
+        found[name].attrs = attributes(one.attrs, one.dtype)
         is_result = name in table.data_vars
         encoding[name] = {"_FillValue": fill_value(str(name), one.dtype) if is_result else None}
         if one.dtype.kind in "OU":
@@ -78,7 +78,7 @@ def new_file(
         yield file
 
 
-def _attributes(attrs: Mapping[Any, Any], dtype: Any = np.int32) -> dict[Any, Any]:
+def attributes(attrs: Mapping[Any, Any], dtype: Any = np.int32) -> dict[Any, Any]:
     """Attributes as every program reads them: text as characters, whole numbers of 32 bits, codes of their type."""
     found: dict[Any, Any] = {}
     for name, value in attrs.items():

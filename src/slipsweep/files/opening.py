@@ -1,6 +1,5 @@
 """Results opened as datasets, whatever program has had them in hand since; what they hold, in words and counts."""
 
-import importlib.util
 import os
 from pathlib import Path
 from typing import Any
@@ -8,10 +7,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from slipsweep.errors import InputError
+from slipsweep.errors import InputError, check_extra
 from slipsweep.files.motions import RECORD_DIM, SUITE_DIM
+from slipsweep.files.outputs import NO_LOCKS
 from slipsweep.files.selection import units_text
-from slipsweep.grid.chunks import CHUNK_CELLS, chunk_lengths
+from slipsweep.grid.chunks import CHUNK_CELLS, chunk_lengths, grid_chunks
+from slipsweep.locks import has_locks
 from slipsweep.model import variables as known
 
 #: All that a command of slipsweep writes, but for the samples of records.
@@ -54,7 +55,9 @@ def open_result(path: str | os.PathLike[str]) -> xr.Dataset:
     -------
     xarray.Dataset
         As `sweep` returns it: modes and counts are whole numbers, -1 where there is no value.  Its
-        variables are dask arrays; those of a store in the chunks that they were written in.
+        variables are dask arrays; those of a store in the chunks that they were written in.  Where
+        another program has left cells without flags (a join, a mask), `validity` is a number, NaN
+        there.
 
     Raises
     ------
@@ -93,18 +96,42 @@ def read_result(path: str | os.PathLike[str]) -> xr.Dataset:
         and "sweep" not in table.attrs
     ):
         raise InputError(f"{path}: not written by slipsweep, or its global attributes are lost")
-    for name, one in dict(table.variables).items():
-        for key in ("_FillValue", "missing_value"):  # how values are stored, not what they mean
-            table[name].attrs.pop(key, None)
-        if one.dtype.kind in "UST":
+    for name, stored in dict(table.variables).items():
+        # how values are stored, not what they mean
+        fills = [table[name].attrs.pop(key, None) for key in ("_FillValue", "missing_value")]
+        if stored.dtype.kind in "UST":
             table[name] = table[name].astype(object)
-        kind = np.dtype(known.RESULT_DTYPES.get(str(name), "f8"))
-        if (
-            kind.kind == "i" and one.dtype != kind
-        ):  # another program has made other numbers of codes
-            missing = 0 if name == "validity" else -1
-            table[name] = table[name].fillna(missing).astype(kind)
+        dtype = np.dtype(known.RESULT_DTYPES.get(str(name), "f8"))
+        if dtype.kind == "i":
+            missing = [fill for fill in fills if fill is not None]
+            table[name] = _as_codes(table[name], dtype, missing)
+            # with it xarray would write NaN, which joins leave, as 0
+            table[name].encoding.pop("dtype", None)
     return table
+
+
+def _as_codes(codes: xr.DataArray, dtype: np.dtype[Any], fills: list[float]) -> xr.DataArray:
+    """Return codes as whole numbers, of which another program may have made other numbers.
+
+    A missing code is -1. Flags have no such code: where some are missing they stay numbers, NaN
+    where they are missing, since 0 would say that no flag is raised.
+    """
+    for fill in fills:
+        if fill != -1:
+            codes = codes.where(codes != fill)
+    if codes.dtype == dtype:
+        return codes
+    if codes.name != "validity":
+        codes = codes.fillna(-1)
+    elif _are_missing(codes):
+        return codes
+    return codes.astype(dtype)
+
+
+def _are_missing(values: xr.DataArray) -> bool:
+    """Return True if any value is NaN, read in chunks."""
+    sizes = {str(dim): size for dim, size in values.sizes.items()}
+    return any(bool(values[part].isnull().any()) for part in grid_chunks(sizes, CHUNK_CELLS))
 
 
 def _open(path: str | os.PathLike[str]) -> xr.Dataset:
@@ -130,15 +157,24 @@ def _open(path: str | os.PathLike[str]) -> xr.Dataset:
             (*known.PARAMETERS, *known.MOTION_COORDINATES, *_RESULTS, *table.variables)
         )
         return table[[name for name in order if name in table.variables]]
+    parts = place if place.suffix == ".part" else place.with_name(f"{place.name}.part")
+    if (parts / "identity.json").is_file() and (parts == place or not place.exists()):
+        chunks = sum(1 for chunk in parts.glob("*.chunk"))
+        raise InputError(
+            f"{path}: is not finished: {chunks} of its chunks are in {parts}; "
+            "run its sweep again with --resume"
+        )
     if not place.exists():
         raise InputError(f"{path}: no such file")
     if not place.is_file():
         raise InputError(f"{path}: is neither a netCDF file nor a Zarr store of format 3")
     try:
         return xr.open_dataset(place, engine="netcdf4", **how)
-    except PermissionError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     except Exception as error:  # netCDF4 and xarray raise what they like on a damaged file
+        if not has_locks(place):
+            raise InputError(f"{path}: cannot be read: {NO_LOCKS}") from None
+        if isinstance(error, PermissionError):
+            raise InputError(f"{path}: cannot be read: {error.strerror}") from None
         made = "; of a sweep file slipsweep run makes one" if place.suffix == ".toml" else ""
         raise InputError(
             f"{path}: not a netCDF file, or a damaged one ({_first_line(error)}){made}"
@@ -147,8 +183,7 @@ def _open(path: str | os.PathLike[str]) -> xr.Dataset:
 
 def check_zarr(path: object) -> None:
     """Refuse a Zarr store where the packages are missing that read and write it."""
-    if None in map(importlib.util.find_spec, ("zarr", "fsspec")):
-        raise InputError(f"{path}: Zarr stores need zarr and fsspec: pip install 'slipsweep[zarr]'")
+    check_extra(f"{path}: a Zarr store", "zarr", "zarr", "fsspec")
 
 
 def _first_line(error: Exception) -> str:

@@ -13,9 +13,13 @@ from pathlib import Path
 
 from slipsweep.errors import InputError, RunError
 from slipsweep.grid.resources import size_text
+from slipsweep.locks import has_locks
 
 #: How an output that is there is refused.
 EXISTS = "{path}: exists already; give --overwrite to replace it, or another name with -o"
+
+#: What to do where the netCDF library cannot lock a file.
+NO_LOCKS = "the file system has no locks; set HDF5_USE_FILE_LOCKING=FALSE to go without"
 
 
 def check_endings(paths: Iterable[Path | str], endings: Collection[str]) -> None:
@@ -53,10 +57,11 @@ def check_outputs(
                     raise InputError(
                         f"{path}: writing it would replace {own}; give another name with -o"
                     )
-            if not path.parent.is_dir():
-                raise InputError(f"{path}: the folder {path.parent} does not exist")
-            if not os.access(path.parent, os.W_OK):
-                raise InputError(f"{path}: the folder {path.parent} is not writable")
+            folder = real_path(path).parent
+            if not folder.is_dir():
+                raise InputError(f"{path}: the folder {folder} does not exist")
+            if not os.access(folder, os.W_OK):
+                raise InputError(f"{path}: the folder {folder} is not writable")
             if path.exists() and not path.is_file() and not (path / "zarr.json").is_file():
                 raise InputError(f"{path}: exists and is neither a file nor a Zarr store")
             if os.path.lexists(path) and not overwrite:
@@ -75,17 +80,23 @@ def check_outputs(
 def complete_or_absent(path: Path, overwrite: bool) -> Iterator[Path]:
     """Yield a temporary name beside `path`; what is written there becomes `path` on success.
 
-    On any error or interruption `path` stays as it was.  RunError: it cannot be written, or another
-    process made it.
+    On any error or interruption `path` stays as it was.  A link stays, and the file that it points
+    to is written.  RunError: it cannot be written, or another process made it.
     """
+    target = real_path(path)
     # not made of the output's name, which may be as long as the system allows
-    temporary = path.with_name(f".slipsweep-{os.getpid()}-{secrets.token_hex(4)}.tmp")
+    temporary = target.with_name(f".slipsweep-{os.getpid()}-{secrets.token_hex(4)}.tmp")
     try:
         with writing(path):
             yield temporary
-            appear(temporary, path, overwrite)
+            appear(temporary, target, overwrite)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def real_path(path: Path) -> Path:
+    """Return the file that a link points to; of another path, itself."""
+    return Path(os.path.realpath(path)) if path.is_symlink() else path
 
 
 def appear(temporary: Path, path: Path, overwrite: bool) -> None:
@@ -110,9 +121,12 @@ def writing(path: Path | str) -> Iterator[None]:
         if isinstance(error, RunError):
             raise
         message = f"{path}: writing failed: {(error.strerror if isinstance(error, OSError) else None) or error}"
+        folder = Path(path).parent
+        if str(path).endswith(".nc") and not has_locks(folder):
+            raise RunError(f"{message}: {NO_LOCKS}") from error
         # all that the netCDF library says of a full disk is "HDF error"
         with suppress(OSError):  # the folder itself may be gone
-            usage = shutil.disk_usage(Path(path).parent)
+            usage = shutil.disk_usage(folder)
             if usage.total:  # some file systems have no size, and are never full
                 message += f" ({size_text(usage.free)} free on the disk)"
         raise RunError(message) from error

@@ -3,13 +3,13 @@
 A worker that is lost costs its chunks once more: distributed computes them again on another.
 """
 
-import importlib.util
+import importlib
 import itertools
 import logging
 import math
 import signal
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 from slipsweep._version import __version__
-from slipsweep.errors import InputError, RunError
+from slipsweep.errors import InputError, RunError, check_extra
 from slipsweep.files import netcdf
 from slipsweep.files.jobs import RUN, Job
-from slipsweep.files.opening import read_result
-from slipsweep.files.outputs import check_outputs, complete_or_absent
-from slipsweep.files.spec import named
+from slipsweep.files.opening import check_zarr, read_result
+from slipsweep.files.outputs import check_outputs, complete_or_absent, real_path
+from slipsweep.files.spec import check_grid, named
 from slipsweep.files.storing import Chunks, Place, ZarrChunks
 from slipsweep.grid.chunks import CHUNK_CELLS, chunk_lengths
 from slipsweep.grid.plans import Plan
@@ -74,6 +74,7 @@ def run(
     workers: int | None = None,
     scheduler: str | None = None,
     progress: Callable[[int], None] | None = None,
+    remarks: Callable[[xr.Dataset], Mapping[str, str]] = lambda results: {},
 ) -> Report:
     """Solve a plan and write its results, complete or not at all.
 
@@ -81,7 +82,8 @@ def run(
     `command`, as typed, goes into its `history`.  `overwrite` replaces it and the chunks of an
     interrupted run, `resume` goes on with these, and leaves a complete output as it is.  The run
     takes so many bytes of `memory`, on so many `workers` of this machine or on those of a
-    `scheduler`.  `progress` is called with a number of cells just solved.
+    `scheduler`.  `progress` is called with a number of cells just solved.  `remarks` makes
+    attributes of the results, which go into the file before it gets its name.
 
     InputError: the output exists or cannot be written, the grid is too large for disk or memory, or
     there are chunks of an interrupted run, of another sweep or version, or without `resume` and
@@ -92,27 +94,27 @@ def run(
         raise InputError("--workers, --scheduler: give one of them, not both")
     if workers is not None and not 1 <= workers <= _MOST_WORKERS:
         raise InputError(f"--workers = {workers}: must be from 1 to {_MOST_WORKERS}")
-    if (workers or scheduler) and importlib.util.find_spec("distributed") is None:
-        raise InputError(
-            "--workers, --scheduler: need the package distributed: pip install 'slipsweep[cluster]'"
-        )
+    if workers or scheduler:
+        check_extra("--workers, --scheduler: a cluster", "cluster", "distributed")
     plan = job.plan
+    is_zarr = isinstance(path, str) or path.suffix == ".zarr"
+    if is_zarr:
+        check_zarr(path)
     if isinstance(path, Path):
         check_outputs([path], overwrite or resume, reads=job.spec.files)
+        path = real_path(path)
     if resume and (complete := _complete(job, path)) is not None:
         return Report(path, tally_of(complete), found=True)
     processes = workers or (64 if scheduler else 0)
     most = _most_cells(plan, memory, workers or 0)
     lengths = chunk_lengths(plan.sizes, _chunk_cells(plan, most, processes), plan.together)
-    is_zarr = isinstance(path, str) or path.suffix == ".zarr"
     chunks = (ZarrChunks if is_zarr else Chunks)(job, path, lengths, most)
     if lengths == plan.sizes and not is_zarr and not processes and not Path(chunks.place).exists():
         with named(job.spec.source):
-            table = plan.solve(progress)
+            table = job.described(plan.solve(progress), command)
+        table.attrs.update(remarks(table))
         with complete_or_absent(Path(path), overwrite) as temporary:
-            netcdf.write_table(
-                job.described(table, command), temporary, job.spec.output.compression
-            )
+            netcdf.write_table(table, temporary, job.spec.output.compression)
         return Report(path, tally_of(table))
     with chunks.begun(command, resume, overwrite), named(job.spec.source), ExitStack() as stack:
         kept = ((place, None) for place in chunks if place[0] in chunks.done)
@@ -127,7 +129,7 @@ def run(
             del results  # before the next is solved
             if progress is not None:
                 progress(plan.part(chunk).cells)
-        chunks.finish(overwrite)
+        chunks.finish(overwrite, remarks)
         return Report(path, tally_of(read_result(path)))
 
 
@@ -145,6 +147,7 @@ def _complete(job: Job, path: Place) -> xr.Dataset | None:
         raise InputError(
             f"{path}: is of another sweep or version; give --overwrite to replace it, or another name with -o"
         )
+    check_grid(found, job.plan.template().coords, path)
     return found
 
 

@@ -34,6 +34,7 @@ _INPUTS = tuple(name for name in variables.PARAMETERS if name != "polarity")
 _MODEL_PARAMETERS = (
     "yield_acceleration",
     "yield_coefficient",
+    "upslope_yield_acceleration",
     "decay_rate",
     "delta_mu",
     "minimum_friction",
@@ -48,6 +49,7 @@ _RECORD_KEYS = (
     "record",
     "records",
     "pairs",
+    "vertical",
     *(one.name for one in choices.declared(reading.Reading)),
     "polarity",
 )
@@ -118,6 +120,22 @@ class SweepSpec:
         """The recorded motion or motions, where these are the shaking."""
         return None if isinstance(self.excitation, Waveform) else self.excitation
 
+    @property
+    def grid(self) -> dict[str, xr.DataArray]:
+        """Coordinates by which cells of the result differ, and parameters with one value."""
+        over = () if self.sampling is None else self.sampling.over
+        grid = {}
+        for name, value in self.inputs.given.items():
+            values = [1, -1] if isinstance(value, str) else value  # polarity = "both"
+            grid[name] = (
+                values
+                if isinstance(values, xr.DataArray)
+                else xr.DataArray(values, dims=(name,) * np.ndim(values))
+            )
+        if isinstance(self.recorded, suites.Suite):
+            grid["motion"] = xr.DataArray(np.array(self.recorded.labels), dims="motion")
+        return {name: values for name, values in grid.items() if name not in over}
+
     def plan(self) -> "Plan":
         """Return what the sweep file describes: a sweep, or the statistics of samples (InputError as `sweep`)."""
         chosen: dict[str, Any] = {
@@ -173,12 +191,13 @@ def is_stream(path: Path) -> bool:
 def _load_result(path: Path) -> SweepSpec:
     with opening.read_result(path) as file:
         attributes = file.attrs
+        if "sweep" not in attributes:
+            raise InputError(
+                f'{path}: no attribute "sweep": only a result of "slipsweep run" can be repeated'
+            )
         recorded = motions.read_embedded(file, path)
-    if "sweep" not in attributes:
-        raise InputError(
-            f'{path}: no attribute "sweep": only a result of "slipsweep run" can be repeated'
-        )
-    spec = parse(str(attributes["sweep"]), str(path), path.parent, recorded)
+        spec = parse(str(attributes["sweep"]), str(path), path.parent, recorded)
+        check_grid(file, spec.grid, path)
     # the solver that ran: it may have been chosen on the command line, over the sweep file's
     with named(str(path)):
         return (
@@ -186,6 +205,36 @@ def _load_result(path: Path) -> SweepSpec:
             if "solver" in attributes
             else spec
         )
+
+
+def check_grid(result: xr.Dataset, grid: Mapping[Any, xr.DataArray], source: object) -> None:
+    """Refuse a result whose grid is not that of its sweep (InputError): it was joined or cut."""
+    known = {*variables.STATISTIC_COORDINATES, motions.RECORD_DIM, motions.SUITE_DIM}
+    known |= {str(dim) for values in grid.values() for dim in values.dims}
+    since = "results were joined or cut after their run"
+    for dim in result.sizes:
+        if dim not in known:
+            raise InputError(
+                f"{source}: {dim}: is no dimension of the sweep that it stores: {since}"
+            )
+    for name, expected in grid.items():
+        values = result[name] if name in result.coords else xr.DataArray(np.empty(0))
+        is_dropped = values.size == 0 and expected.size == 1  # some programs drop scalars
+        if not is_dropped and not _are_same(values.values.ravel(), expected.values.ravel()):
+            there = opening.values_text(values) if values.size else "no values"
+            stored = opening.values_text(expected.assign_attrs(values.attrs))
+            raise InputError(
+                f"{source}: {name}: {there}, where the sweep that it stores has {stored}: {since}"
+            )
+
+
+def _are_same(values: NDArray[Any], others: NDArray[Any]) -> bool:
+    """Return True if values are equal to others in any order, numbers to single precision."""
+    if values.size != others.size:
+        return False
+    if others.dtype.kind in "OU":
+        return sorted(map(str, values)) == sorted(map(str, others))
+    return np.allclose(np.sort(values), np.sort(others), rtol=1e-6, atol=0.0, equal_nan=True)
 
 
 def parse(
@@ -301,28 +350,31 @@ def _recorded_motion(
     """The records in files that [excitation] names, or those that a result has kept."""
     table = tables["excitation"]
     others = [f"excitation.{one}" for one in table if one not in _RECORD_KEYS]
-    for other in (*others, *(f"solver.{one}" for one in tables["solver"])):
+    for other in others:
         raise InputError(
             f"{other}: not allowed with excitation.{key}, to which the response is exact"
         )
     if {"record", "records"} <= {*table}:
         raise InputError("excitation.records: not allowed beside record: give one of them")
-    if key == "record" and "pairs" in table:
-        raise InputError("excitation.pairs: only beside excitation.records, the files of a suite")
+    for other in ("pairs", "vertical"):
+        if key == "record" and other in table:
+            raise InputError(
+                f"excitation.{other}: only beside excitation.records, the files of a suite"
+            )
     if key == "record" and not isinstance(table["record"], str):
         raise InputError(
             f"excitation.record = {units.show(table['record'])}: must be the name of a file"
         )
     if recorded is not None:
         return recorded
-    given = {
-        name: value for name, value in table.items() if name not in ("record", "records", "pairs")
-    }
+    own = ("record", "records", "pairs", "vertical")
+    given = {name: value for name, value in table.items() if name not in own}
     try:
         how = reading.Reading(**given)
         if key == "record":
             return records.read_record(folder / table["record"], **how.options)
-        return suites.suite_in(folder, table["records"], table.get("pairs"), how)
+        vertical = table.get("vertical", "leave_out")
+        return suites.suite_in(folder, table["records"], table.get("pairs"), how, vertical)
     except InputError as error:
         message = (
             str(error).replace("paths", key, 1) if str(error).startswith("paths") else str(error)
@@ -411,6 +463,8 @@ def _output(table: _Table, has_statistics: bool) -> Output:
     for name in ("path", "title"):
         if not isinstance(table.get(name, ""), str):
             raise InputError(f"output.{name} = {units.show(table[name])}: must be a text")
+    if table.get("path") == "":
+        raise InputError('output.path = "": must be the name of a file')
     found = Output(**table)
     parameters.check_choice("output.dtype", found.dtype, ("float64", "float32"))
     parameters.check_whole("output.compression", found.compression, 0, 9)

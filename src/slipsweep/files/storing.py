@@ -14,8 +14,9 @@ import json
 import math
 import os
 import shutil
+import warnings
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -26,14 +27,15 @@ import numpy as np
 import xarray as xr
 from fsspec.core import url_to_fs
 
-from slipsweep.errors import InputError, RunError
+from slipsweep.errors import InputError, RunError, RunWarning
 from slipsweep.files import netcdf
 from slipsweep.files.jobs import Job
-from slipsweep.files.opening import check_zarr
+from slipsweep.files.opening import check_zarr, read_result
 from slipsweep.files.outputs import EXISTS, appear, writing
 from slipsweep.grid.chunks import Chunk, grid_chunks
 from slipsweep.grid.plans import Plan
 from slipsweep.grid.resources import size_text
+from slipsweep.locks import lock_held
 
 #: A file or folder, or the address of a store.
 Place = Path | str
@@ -86,10 +88,12 @@ class Chunks:
         InputError: neither may be done.  RunError: another run is writing it, or writing failed.  A
         note to any error says how many chunks are kept.
         """
-        with (
-            self._locked() if isinstance(self.path, Path) else nullcontext()
-        ):  # an address has no lock
+        # an address has no lock
+        with self._locked() if isinstance(self.path, Path) else nullcontext(True) as is_locked:
             self._begin(command, resume, overwrite)
+            if not is_locked:
+                text = "the file system has no locks: a second run at this output would not be seen"
+                warnings.warn(RunWarning(f"{self.path}: {text}"), stacklevel=2)
             try:
                 with writing(self.path):
                     yield
@@ -102,20 +106,18 @@ class Chunks:
                 raise
 
     @contextmanager
-    def _locked(self) -> Iterator[None]:
-        """Keep other runs away from this output."""
-        from filelock import FileLock, Timeout
-
+    def _locked(self) -> Iterator[bool]:
+        """Keep other runs away from this output; False where the file system has no locks."""
         folder = Path(self.place)
-        with writing(self.path):
-            folder.mkdir(exist_ok=True)
-            try:
-                held = FileLock(folder / "lock").acquire(timeout=0)
-            except Timeout:
-                raise RunError(f"{self.path}: another run is writing it") from None
         try:
-            with held:
-                yield
+            with ExitStack() as stack:
+                with writing(self.path):
+                    folder.mkdir(exist_ok=True)
+                    try:
+                        is_locked = stack.enter_context(lock_held(folder / "lock", timeout=0.0))
+                    except TimeoutError:
+                        raise RunError(f"{self.path}: another run is writing it") from None
+                yield is_locked
         finally:
             if folder.is_dir() and not (folder / "identity.json").exists() and not self._finished():
                 shutil.rmtree(folder, ignore_errors=True)
@@ -218,15 +220,23 @@ class Chunks:
                         file[name][region] = source[name][region]
         return compressed
 
-    def finish(self, overwrite: bool) -> None:
-        """Give the output its name."""
+    def add_attributes(self, path: str, attributes: Mapping[str, str]) -> None:
+        """Add attributes to the file or store."""
+        with netCDF4.Dataset(path, "r+") as file:
+            file.setncatts(netcdf.attributes(attributes))
+
+    def finish(self, overwrite: bool, remarks: Callable[[xr.Dataset], Mapping[str, str]]) -> None:
+        """Add attributes that follow from the results, and give the output its name."""
         complete = self.completed()
+        with read_result(complete) as results:
+            attributes = remarks(results)
+        self.add_attributes(complete, attributes)
         if isinstance(self.path, Path):
             appear(Path(complete), self.path, overwrite)
         self._files.rm(self._folder, recursive=True)
 
 
-def _region(chunk: Chunk, result: netCDF4.Variable) -> Any:
+def _region(chunk: Chunk, result: "netCDF4.Variable[Any]") -> Any:
     return tuple(chunk.get(dim, slice(None)) for dim in result.dimensions) or ...
 
 
@@ -289,6 +299,11 @@ class ZarrChunks(Chunks):
 
         del zarr.open_group(self.target, mode="r+").attrs["unfinished"]
         return self.target
+
+    def add_attributes(self, path: str, attributes: Mapping[str, str]) -> None:
+        import zarr
+
+        zarr.open_group(path, mode="r+").attrs.update(attributes)
 
 
 def _write_region(

@@ -11,7 +11,7 @@ import xarray as xr
 from slipsweep.errors import InputError
 from slipsweep.model import parameters
 from slipsweep.model import variables as known
-from slipsweep.model.options import MODELS, SOLVERS, Cycle, Model, Newmark, Solver
+from slipsweep.model.options import MODELS, SOLVERS, Model, Newmark, Solver, slides_both_ways
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform, peak_acceleration
@@ -29,12 +29,7 @@ class Problem:
 def check_problem(excitation: Any, model: Any, solver: Any) -> Problem:
     """What is to be solved, and how; each is an object, or the name of one with its defaults."""
     motion = excitation if isinstance(excitation, (Record, Suite)) else WAVEFORMS.of(excitation)
-    chosen = SOLVERS.of(solver)
-    if isinstance(motion, (Record, Suite)) and not isinstance(chosen, Cycle):
-        raise InputError(
-            f"solver = {chosen}: not allowed with a {type(motion).__name__}, to which Cycle() is exact"
-        )
-    return Problem(MODELS.of(model), motion, chosen)
+    return Problem(MODELS.of(model), motion, SOLVERS.of(solver))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,6 +60,7 @@ class Inputs:
     azimuth: Any = None
     yield_acceleration: Any = None
     yield_coefficient: Any = None
+    upslope_yield_acceleration: Any = None
     decay_rate: Any = None
     delta_mu: Any = None
     minimum_friction: Any = None
@@ -136,6 +132,12 @@ def _refuse_others(motion: Waveform | Record | Suite, given: Mapping[str, Any]) 
 
 def _check_interface(model: Model, given: Mapping[str, Any]) -> None:
     """Refuse an interface that is not known, or known twice."""
+    both = slides_both_ways(model)
+    if "upslope_yield_acceleration" in given and not both:
+        raise InputError(
+            "upslope_yield_acceleration: only with model = Newmark(sliding='both'), "
+            "not where the block slides downslope only"
+        )
     if "yield_coefficient" not in given:
         parameters.check_given(given, ("theta",))
         parameters.check_friction(given)
@@ -145,8 +147,13 @@ def _check_interface(model: Model, given: Mapping[str, Any]) -> None:
             f"yield_coefficient: not allowed with model = {model.name!r}, whose friction needs theta and mu_s; "
             "only with model = 'newmark'; here give yield_acceleration"
         )
+    if both and "theta" not in given and "upslope_yield_acceleration" not in given:
+        raise InputError(
+            "theta, upslope_yield_acceleration: one of them must be given beside yield_coefficient "
+            "with sliding = 'both'"
+        )
     for name in known.INTERFACE_INPUTS:
-        if name in given:
+        if name in given and not (both and name == "theta"):
             raise InputError(f"{name}: not allowed beside yield_coefficient, which replaces it")
 
 

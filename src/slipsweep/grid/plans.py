@@ -17,16 +17,13 @@ from slipsweep._version import __version__
 from slipsweep.errors import InputError
 from slipsweep.grid import chunks, engine, resources
 from slipsweep.grid import inputs as grid_inputs
-from slipsweep.grid.solvers import ROWS, cost_of, memory_of
+from slipsweep.grid.solvers import NEWMARK_ROWS, ROWS, cost_of, memory_of
 from slipsweep.model import options
 from slipsweep.model import variables as known
 from slipsweep.model.parameters import check_choices, check_friction, check_given, check_progress
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform, peak_acceleration
-
-_SOURCE = {"source": f"slipsweep {__version__}", "references": known.REFERENCE}
-
 
 #: Results that lie on the same dimensions: what solves them (`engine.solve`, say), and its request.
 Task: TypeAlias = tuple[Callable[[engine.Request], engine.Variables], engine.Request]
@@ -172,7 +169,16 @@ def plan_sweep(
     results = known.RESULTS if is_wave else known.RECORD_RESULTS
     default: tuple[str, ...] = known.DEFAULT_RESULTS if is_wave else known.DEFAULT_RECORD_RESULTS
     default += ("motion_factor",) if isinstance(problem.excitation, Suite) else ()
+    has_extremes = options.slides_both_ways(problem.model) and not isinstance(
+        problem.solver, options.Step
+    )
+    default += tuple(known.EXTREMES) if has_extremes else ()
     wanted = default if variables is None else check_choices("variables", variables, results)
+    for name in known.EXTREMES:
+        if name in wanted and not has_extremes:
+            raise InputError(
+                f"variables: {name}: only with model = Newmark(sliding='both') and solver = 'cycle'"
+            )
     solved = grid_inputs.inputs_of(problem, coords)
     drive = _drive(solved)
     if "displacement_amplitude" in drive:
@@ -186,10 +192,14 @@ def plan_sweep(
             }
 
     tasks = []
-    if motion := tuple(name for name in wanted if name in ROWS and name != "newmark_displacement"):
+    if motion := tuple(
+        name
+        for name in wanted
+        if (name in ROWS or name in NEWMARK_ROWS) and name != "newmark_displacement"
+    ):
         tasks.append(_task(engine.solve, problem, motion, solved))
     if "newmark_displacement" in wanted:
-        classical = replace(problem, model=options.Newmark(problem.model.g))
+        classical = replace(problem, model=options.Newmark(g=problem.model.g))
         tasks.append(_task(engine.solve, classical, ("newmark_displacement",), solved))
     cost = cost_of(problem) * max(len(tasks), 1)
     # one that was given is a coordinate already
@@ -226,7 +236,7 @@ def plan_friction_parameters(inputs: grid_inputs.Inputs, *, model: Any = "mendez
         "validity",
     )
     task = _friction_task(problem, names, coords)
-    attrs = {"title": "Friction parameters", **_SOURCE, **options.MODELS.attributes(problem.model)}
+    attrs = {"title": "Friction parameters", **_origin(problem)}
     return Plan(dict(task[1].sizes), coords, (task,), names, attrs)
 
 
@@ -294,6 +304,7 @@ def _about(problem: grid_inputs.Problem, given: Collection[str]) -> dict[str, An
     """What results say of themselves: the choices read back from it are those of the problem."""
     motion = problem.excitation
     title = "Response of a rigid block to a recorded motion"
+    shaking: dict[str, Any]
     if isinstance(motion, Record):
         shaking = {"record": motion.name, **motion.attrs}
     elif isinstance(motion, Suite):
@@ -301,12 +312,22 @@ def _about(problem: grid_inputs.Problem, given: Collection[str]) -> dict[str, An
         shaking = {**motion.attrs}
     else:
         title = "Permanent displacement of a rigid block, swept"
-        shaking = WAVEFORMS.attributes(motion) | options.SOLVERS.attributes(problem.solver)
-    inputs = {"friction_inputs": options.friction_inputs(problem.model.name, given, {})}
+        shaking = WAVEFORMS.attributes(motion)
+    sources = options.friction_inputs(problem.model.name, given, {})
+    if options.slides_both_ways(problem.model):
+        is_given = "upslope_yield_acceleration" in given
+        sources += f"; Üy,up {'given' if is_given else 'by statics, from Üy and θ'}"
+    inputs = {"friction_inputs": sources}
     return {
         "title": title,
-        **_SOURCE,
-        **options.MODELS.attributes(problem.model),
+        **_origin(problem),
         **inputs,
         **shaking,
+        **options.SOLVERS.attributes(problem.solver),
     }
+
+
+def _origin(problem: grid_inputs.Problem) -> dict[str, Any]:
+    """Return attributes for the program and the model that results come from."""
+    source = {"source": f"slipsweep {__version__}", "references": problem.model.reference}
+    return source | options.MODELS.attributes(problem.model)

@@ -1,5 +1,6 @@
 """Which kernel solves a problem: the sine's SIMD batches, the exact walk under a wave or a record, or steps."""
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -7,20 +8,22 @@ import numpy as np
 
 from slipsweep.grid.inputs import Problem
 from slipsweep.kernels import block as physics
-from slipsweep.kernels.exact import workspace_of
-from slipsweep.kernels.grid import find_parameters
-from slipsweep.kernels.record import solve_record
+from slipsweep.kernels import newmark, step
+from slipsweep.kernels.grid import CELL, find_parameters
 from slipsweep.kernels.sine.solve import solve_sine
-from slipsweep.kernels.step import RECTANGLE, SIMPSON, TRAPEZOID, solve_steps
-from slipsweep.kernels.waves import solve_waves
-from slipsweep.model.options import Mendez, Step
+from slipsweep.kernels.walk import solve_walk, workspace_of
+from slipsweep.model.options import Mendez, Newmark, Step, slides_both_ways
 from slipsweep.model.variables import FRICTION_PARAMETERS
 from slipsweep.motion import cutting
+from slipsweep.motion.paths import Path
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import Sine, Waveform
 
-RULES = {"rectangle": RECTANGLE, "trapezoid": TRAPEZOID, "simpson": SIMPSON}
+RULES = {"rectangle": step.RECTANGLE, "trapezoid": step.TRAPEZOID, "simpson": step.SIMPSON}
+
+#: Steps between two samples of a record: one for so many steps a cycle.
+STEPS_PER_SAMPLE = 64
 RISES = {"monotone": physics.MONOTONE, "literal": physics.LITERAL}
 RECOUPLINGS = {"eq12": physics.EQ12, "integrate": physics.INTEGRATE}
 
@@ -30,6 +33,9 @@ ROWS = {_NAMES.get(field, field): row for row, field in enumerate(physics.Motion
 # Newmark's block is solved as a problem of its own
 ROWS["newmark_displacement"] = ROWS["permanent_displacement"]
 
+NEWMARK_ROWS = {name: row for row, name in enumerate(newmark.RESULTS)}
+NEWMARK_ROWS["newmark_displacement"] = NEWMARK_ROWS["permanent_displacement"]
+
 #: The same of `find_parameters`.
 _PARAMETER_ROWS = {
     name: row for row, name in enumerate((*FRICTION_PARAMETERS, "sliding_mode", "validity"))
@@ -37,10 +43,11 @@ _PARAMETER_ROWS = {
 
 
 class Solver(NamedTuple):
-    """What solves cells, of dtype `kernels.grid.CELL`, into results, (rows, cells)."""
+    """What solves cells of a dtype into results, (rows, cells)."""
 
     solve: Callable[[np.ndarray, np.ndarray], Any]
     rows: Mapping[str, int]  # of the results
+    cell: np.dtype[Any] = CELL
 
 
 def options_of(problem: Problem, wants_peak: bool) -> physics.Options:
@@ -67,10 +74,12 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
     """What solves the cells of a problem that one motion shakes."""
     motion = problem.excitation
     options = options_of(problem, wants_peak)
+    if isinstance(problem.model, Newmark) and not isinstance(problem.solver, Step):
+        return newmark_solver(problem, options, polarity)
 
     def under_wave(cells: np.ndarray, results: np.ndarray) -> None:
-        wave = cutting.wave_of(motion)
-        solve_waves(cells, options, wave, workspace_of(wave), results)
+        path = cutting.path_of_waveform(motion)
+        solve_walk(cells, options, path, *workspace_of(), results)
 
     def under_sine(cells: np.ndarray, results: np.ndarray) -> None:
         if solve_sine(cells, options, results):
@@ -79,21 +88,75 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
             under_wave(cells[left], found)
             results[:, left] = found
 
-    if isinstance(motion, Record):
-        wave = cutting.wave_of_record(motion, polarity)
+    if isinstance(problem.solver, Step):
+        stepper = stepper_of(problem, options, polarity)
+        no_history = step.history_of(np.empty(0), np.empty(0))
         return Solver(
-            lambda cells, results: solve_record(cells, options, wave, workspace_of(wave), results),
-            ROWS,
+            lambda cells, results: stepper(cells, no_history, results), ROWS, step.STEP_CELL
+        )
+    if isinstance(motion, Record):
+        path = cutting.path_of_record(motion, polarity)
+        return Solver(
+            lambda cells, results: solve_walk(cells, options, path, *workspace_of(), results), ROWS
         )
     assert isinstance(motion, Waveform)
-    if isinstance(problem.solver, Step):
-        wave = cutting.wave_of(motion)
-        rule = RULES[problem.solver.rule]
-        count = problem.solver.steps_per_cycle
-        return Solver(
-            lambda cells, results: solve_steps(cells, options, wave, rule, count, results), ROWS
-        )
     return Solver(under_sine if is_plain_sine(motion) else under_wave, ROWS)
+
+
+def newmark_solver(problem: Problem, options: physics.Options, polarity: float) -> Solver:
+    """Return the solver of Newmark's block: its own kernel, or under a plain sine the batches."""
+    assert not isinstance(problem.excitation, Suite)
+    path = path_under(problem.excitation, polarity)
+
+    def solve(cells: np.ndarray, results: np.ndarray) -> None:
+        blocks = np.zeros(1, newmark.BLOCK)
+        newmark.solve_newmark(cells, options.g, options.wants_peak, path, blocks, results)
+
+    def solve_in_batches(cells: np.ndarray, results: np.ndarray) -> None:
+        if not solve_sine(cells, options, results):
+            return
+        left = np.flatnonzero(results[ROWS["validity"]] == physics.UNSOLVED)
+        others = np.full(left.size, math.nan, newmark.NEWMARK_CELL)
+        for name in newmark.DOWNSLOPE_FIELDS:
+            others[name] = cells[name][left]
+        solved = np.empty((len(newmark.RESULTS), left.size))
+        solve(others, solved)
+        results[:, left] = solved[: results.shape[0]]
+
+    # a batch solves several cells at once, the kernel one by one
+    if is_plain_sine(problem.excitation) and not slides_both_ways(problem.model):
+        return Solver(solve_in_batches, ROWS)
+    return Solver(solve, NEWMARK_ROWS, newmark.NEWMARK_CELL)
+
+
+def path_under(motion: Waveform | Record, polarity: float) -> Path:
+    """Return the path of the base under a waveform or a record."""
+    if isinstance(motion, Record):
+        return cutting.path_of_record(motion, polarity)
+    return cutting.path_of_waveform(motion)
+
+
+def stepper_of(
+    problem: Problem, options: physics.Options, polarity: float
+) -> Callable[[np.ndarray, step.History, np.ndarray], Any]:
+    """What solves cells by steps: cells, of dtype `step.STEP_CELL`, a history and results."""
+    assert isinstance(problem.solver, Step)
+    rule = RULES[problem.solver.rule]
+    count = problem.solver.steps_per_cycle
+    assert not isinstance(problem.excitation, Suite)
+    is_record = isinstance(problem.excitation, Record)
+    on_piece = math.ceil(count / STEPS_PER_SAMPLE) if is_record else 0
+    path = path_under(problem.excitation, polarity)
+    steps = step.steps_of(path, rule, count, on_piece)
+
+    def solve(cells: np.ndarray, history: step.History, results: np.ndarray) -> None:
+        blocks = step.blocks_of(rule, count, on_piece)
+        step.solve_steps(cells, options, path, blocks, steps, history, results)
+        if slides_both_ways(problem.model):  # a displacement upslope is no caution there
+            validity = results[ROWS["validity"]].astype(np.int64)
+            results[ROWS["validity"]] = validity & ~physics.UPSLOPE
+
+    return solve
 
 
 def is_plain_sine(motion: Any) -> bool:
@@ -104,13 +167,14 @@ def is_plain_sine(motion: Any) -> bool:
 def cost_of(problem: Problem) -> int:
     """What a cell takes, about, in those of a plain sine by the cycle solver."""
     motion = problem.excitation
+    steps = problem.solver.steps_per_cycle if isinstance(problem.solver, Step) else 0
     if isinstance(motion, Waveform):
-        if isinstance(problem.solver, Step):
-            return 1 + problem.solver.steps_per_cycle // 16
-        return 1 if is_plain_sine(motion) else 16
-    return max(
-        64, max(one.times.size for one in (motion if isinstance(motion, Suite) else (motion,))) // 8
-    )
+        if steps:
+            return 1 + steps // 16
+        return 1 if is_plain_sine(motion) and not slides_both_ways(problem.model) else 16
+    records = motion if isinstance(motion, Suite) else (motion,)
+    samples = max(record.times.size for record in records)
+    return max(64, samples // 8) * math.ceil(max(steps, 1) / STEPS_PER_SAMPLE)
 
 
 def memory_of(problem: Problem) -> int:

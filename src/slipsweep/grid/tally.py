@@ -65,11 +65,13 @@ class Tally:
     """Counts of cells, all and those of each sliding mode and each flag, and displacements over Newmark's.
 
     None: not stored.  Of samples the cells are grid points, and a count is the sum of their shares.
+    `unflagged` cells have lost their flags in another program.
     """
 
     cells: int
     modes: dict[SlidingMode, float] | None = None
     flags: dict[Validity, float] | None = None
+    unflagged: int = 0
     ratios: Ratios | None = None
     indices: Indices | None = None
 
@@ -101,10 +103,12 @@ def tally_of(results: xr.Dataset) -> Tally:
         part = {name: results[name].isel(chunk, missing_dims="ignore").values for name in names}
         for mode in SlidingMode if tally.modes else ():
             modes[mode] += np.count_nonzero(part["sliding_mode"] == int(mode))
-        for flag in Validity if tally.flags else ():
-            flags[flag] += np.count_nonzero(
-                part["validity"].astype(np.int16, copy=False) & flag.value
-            )
+        if tally.flags:
+            is_lost = np.isnan(part["validity"])
+            tally.unflagged += int(np.count_nonzero(is_lost))
+            raised = np.where(is_lost, 0, part["validity"]).astype(np.int16, copy=False)
+            for flag in Validity:
+                flags[flag] += np.count_nonzero(raised & flag.value)
         if tally.ratios:
             tally.ratios.add(part[_MOVED[0]], part[_MOVED[1]])
     return tally

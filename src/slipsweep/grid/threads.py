@@ -45,5 +45,9 @@ def spread(parts: Collection[Part], work: Callable[[Part], None]) -> None:
         for part in parts:
             work(part)
         return
-    with ThreadPoolExecutor(count) as pool:
-        list(pool.map(work, parts))  # which cancels what has not begun, at Ctrl-C, too
+    pool = ThreadPoolExecutor(count)
+    try:
+        list(pool.map(work, parts))  # the list: errors leave the pool with the results
+    finally:
+        # parts that have not begun are left out, also at Ctrl-C while they are handed in
+        pool.shutdown(cancel_futures=True)

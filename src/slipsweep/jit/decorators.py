@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-import cffi
 import numba
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -25,40 +24,30 @@ def part(*fastmath: str, **options: Any) -> Callable[[_Function], _Function]:
     return decorate
 
 
-#: `contract` lets the compiler fuse a*b + c, `arcp` divide by g once.  Not `reassoc`: sums whose
-#: order the compiler chooses have other last bits in the process that compiles than in those that
-#: load the kernel.
-scalar = part("arcp")
+#: Options of functions that only kernels call, which takes a quarter of the time to compile them:
+#: Python cannot call them.  They allocate nothing, and count no references to arrays: those are
+#: arguments of a kernel, which outlive it.
+_INTERNAL = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
+
+#: A function that only kernels call.  `contract` lets the compiler fuse a*b + c, `arcp` divide by g
+#: once.  Not `reassoc`: sums whose order the compiler chooses have other last bits in the process
+#: that compiles than in those that load the kernel.
+scalar = part("arcp", **_INTERNAL)
 
 #: The same for what stands in loops over cells: LLVM vectorises a loop only if everything in it is
-#: inlined, which it does not do by itself with functions as long as these.  And for what takes a
-#: state or a wave at each part of a walk: their fields are arguments one by one, which takes as
-#: long as the step.
-inlined = part("arcp", forceinline=True)
+#: inlined, which it does not do by itself with functions as long as these.
+inlined = part("arcp", forceinline=True, **_INTERNAL)
 
-#: The same for a function with one caller and many callees, which numba would otherwise optimise
-#: once more.
-single = part("arcp", inline="always")
+#: The same for a function with one caller and many callees.  numba links, optimises and emits all
+#: that is below a function with each function above it.
+single = part("arcp", inline="always", **_INTERNAL)
 
 #: The same for elementary functions, which have no division to share.
 elementary = part("nsz", forceinline=True)
 
-#: The same for functions that are passed as values, those of a friction law: numba keeps a kernel
-#: on disk only if such a function is none that was compiled before.
-registered: Callable[[_Function], _Function] = numba.extending.register_jitable(
-    error_model="numpy", fastmath={"contract", "arcp"}, forceinline=True
+#: An equation: a function of Python, which kernels compile like `inlined`.  So it may be passed to
+#: them as a value, too.
+equation: Callable[[_Function], _Function] = numba.extending.register_jitable(
+    nogil=True, error_model="numpy", fastmath={"contract", "arcp"}, forceinline=True, **_INTERNAL
 )
-
-_ffi = cffi.FFI()
-
-
-def _uncounted(array: Any) -> Any:
-    """The same array, to which numba counts no references.
-
-    For arguments of a kernel, which outlive it: numba would count references to each array of a
-    wave in each function that it goes through, half of the time of a cell.
-    """
-    return numba.carray(_ffi.from_buffer(array), array.shape)
-
-
-uncounted = (lambda array: array) if numba.config.DISABLE_JIT else scalar(_uncounted)
+registered = equation

@@ -1,4 +1,4 @@
-"""The block that all kernels move: its parameters, its validity, and Eq. 4 with its friction.
+"""What all kernels share: the definition of a cell, Eqs. 7-11 with what is given in their place, and the flags.
 
 Time enters the motion only through the phase φ = ωt.  The kernels work in phase: rates of velocity
 are accelerations (m/s² a radian), and a velocity V and a displacement W of theirs, both in m/s²,
@@ -12,9 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from slipsweep.jit.decorators import inlined, scalar
-from slipsweep.kernels.events import root_of
 from slipsweep.model import equations as eq
-from slipsweep.model.friction import FrictionLaw
 from slipsweep.model.variables import VALUELESS, Validity
 
 #: How the block's acceleration rises with the base's (the `model` and `rise` options).
@@ -40,6 +38,9 @@ FRICTION_ESTIMATED = int(Validity.FRICTION_ESTIMATED)
 #: Not a flag of results: an event was not found (`events`), and the engine raises an error.
 UNSOLVED = 1 << 14
 NO_VALUE = int(VALUELESS) | UNSOLVED
+
+#: Cautions and notes of the motion, which a block without a value has not.
+OF_A_VALUE = YIELD_GOVERNS | NOT_RECOUPLED | NEAR_MODE_LIMIT | FRICTION_ESTIMATED
 
 
 class Cell(NamedTuple):
@@ -74,20 +75,6 @@ class Interface(NamedTuple):
     delta_mu: float
     sliding_mode: int
     validity: int
-
-
-class Block(NamedTuple):
-    """A block with all that its motion depends on: few numbers, which fit into the registers of a call."""
-
-    amplitude: float
-    yield_acceleration: float
-    mu_s: float
-    tan_theta: float
-    delta_mu: float
-    decay_rate: float
-    g: float
-    rise: int
-    law: FrictionLaw
 
 
 class Motion(NamedTuple):
@@ -166,32 +153,13 @@ def decay_rate_of(cell: Cell, delta_mu: float, minimum_friction: float, g: float
 
 
 @inlined
-def block_of(
-    law: FrictionLaw, amplitude: float, cell: Cell, interface: Interface, options: Options
-) -> Block:
-    """A cell's block, λ from Eq. 6 where it is not given; the base's acceleration is the `amplitude` times w."""
-    decay_rate = decay_rate_of(cell, interface.delta_mu, interface.minimum_friction, options.g)
-    return Block(
-        amplitude,
-        interface.yield_acceleration,
-        cell.mu_s,
-        cell.tan_theta,
-        interface.delta_mu,
-        decay_rate,
-        options.g,
-        options.rise,
-        law,
-    )
-
-
-@inlined
 def settled(validity: int, displacement: float, amplitude: float) -> int:
-    """The flags of a block once its W is known: what is said of a value needs one.
+    """Add `upslope` to the flags of a block; where it has no value, drop what is said of one.
 
     A displacement that is zero to rounding, by the base's peak acceleration A/ω², is none upslope.
     """
     moved = validity | (UPSLOPE if displacement < -1e-12 * amplitude else 0)
-    return moved if validity & NO_VALUE == 0 else validity & ~(NEAR_MODE_LIMIT | FRICTION_ESTIMATED)
+    return moved if validity & NO_VALUE == 0 else validity & ~OF_A_VALUE
 
 
 @inlined
@@ -205,118 +173,3 @@ def store(found: Motion, j: int, results: np.ndarray) -> None:
     """Write what was found of cell j into its column of the results, (fields of `Motion`, cells)."""
     for row in range(len(found)):
         results[row, j] = found[row]
-
-
-# ------------------------------------------------------------------ Eq. 4 with the friction of a
-# block
-
-
-@inlined
-def friction(block: Block, x: float) -> float:
-    """μ at base acceleration x (Eq. 6, or another law)."""
-    return block.law.friction(x, block.mu_s, block.delta_mu, block.decay_rate, block.g)
-
-
-@scalar
-def response(block: Block, x: float) -> float:
-    """E(x), the block's acceleration that Eq. 4 gives at base acceleration x."""
-    return eq.block_acceleration(x, friction(block, x), block.mu_s, block.tan_theta, block.g)
-
-
-@scalar
-def relative_acceleration(block: Block, x: float) -> float:
-    """D(x) = x − E(x): rate of the relative velocity where the block obeys Eq. 4."""
-    return eq.relative_acceleration(x, friction(block, x), block.mu_s, block.tan_theta, block.g)
-
-
-@scalar
-def starting_acceleration(block: Block, x: float) -> float:
-    """c(x), the block's acceleration as it starts to slide at base acceleration x."""
-    if block.rise == NEWMARK:
-        return block.yield_acceleration
-    if block.rise == LITERAL:
-        return response(block, x)
-    return max(block.yield_acceleration, response(block, x))
-
-
-@scalar
-def slopes(block: Block, x: float) -> tuple[float, float, float]:
-    """E, dE/dx and d²E/dx² (x ≠ 0)."""
-    mu = friction(block, x)
-    first, second = block.law.derivatives(mu, block.decay_rate, block.g)
-    slope = eq.relative_acceleration_slope(x, mu, first, block.mu_s, block.tan_theta, block.g)
-    curvature = eq.relative_acceleration_curvature(x, first, second, block.tan_theta, block.g)
-    return (
-        eq.block_acceleration(x, mu, block.mu_s, block.tan_theta, block.g),
-        1.0 - slope,
-        -curvature,
-    )
-
-
-@scalar
-def inflection(block: Block) -> float:
-    """x > 0 up to which E is concave; it is convex beyond."""
-    return block.law.inflection(block.tan_theta, block.decay_rate, block.g)
-
-
-@scalar
-def opposite(a: float, b: float) -> bool:
-    """Whether one is positive and the other negative; their product might underflow."""
-    return a < 0.0 < b or b < 0.0 < a
-
-
-@scalar
-def _response_above(where: tuple[Block, float], x: float) -> tuple[float, float]:
-    block, level = where
-    value, slope, _ = slopes(block, x)
-    return value - level, slope
-
-
-@scalar
-def _slope_above(where: tuple[Block, float], x: float) -> tuple[float, float]:
-    block, level = where
-    _, slope, curvature = slopes(block, x)
-    return slope - level, curvature
-
-
-@scalar
-def _relative_acceleration_and_slope(block: Block, x: float) -> tuple[float, float]:
-    value, slope, _ = slopes(block, x)
-    return x - value, 1.0 - slope
-
-
-#: x at which E is a level, given (block, level).
-response_root = root_of(_response_above)
-_slope_root = root_of(_slope_above)
-_relative_acceleration_root = root_of(_relative_acceleration_and_slope)
-
-
-@scalar
-def slope_root(block: Block, level: float, start: float, end: float) -> float:
-    """x between start and end at which dE/dx = level, which it passes."""
-    if slopes(block, end)[1] >= level:
-        return _slope_root((block, level), start, end, end, 0.0)
-    return _slope_root((block, level), end, start, end, 0.0)
-
-
-@scalar
-def relative_acceleration_root(block: Block, start: float, end: float) -> float:
-    """x between start and end at which D = 0, whose sign changes."""
-    # friction is back at μs there, and most D are near 0: from the end Newton's steps would leave
-    # the bracket
-    at_static = block.law.static_acceleration(block.mu_s, block.delta_mu, block.decay_rate, block.g)
-    static = math.copysign(at_static, end)
-    first = static if min(start, end) < static < max(start, end) else end
-    if relative_acceleration(block, end) >= 0.0:
-        return _relative_acceleration_root(block, start, end, first, 0.0)
-    return _relative_acceleration_root(block, end, start, first, 0.0)
-
-
-@scalar
-def stays_below_yield(block: Block, start: float, end: float) -> bool:
-    """Whether Eq. 4 stays at or below the yield value on the base's way from `start`, no less than it, to `end`."""
-    highest = max(response(block, start), response(block, end))
-    bend = min(inflection(block), end)
-    if bend > start and slopes(block, start)[1] > 0.0 > slopes(block, bend)[1]:
-        highest = max(highest, response(block, slope_root(block, 0.0, start, bend)))
-    return highest <= block.yield_acceleration

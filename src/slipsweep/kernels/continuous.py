@@ -1,4 +1,4 @@
-"""Continuous sliding from event to event: Eq. 4 throughout.
+"""Continuous sliding from event to event: Eq. 4 throughout, V of either sign.
 
 docs/numerics.md#continuous-sliding
 """
@@ -7,142 +7,166 @@ import math
 
 import numpy as np
 
-from slipsweep.jit.decorators import inlined, scalar
-from slipsweep.kernels import block as physics
-from slipsweep.kernels import exact
-from slipsweep.kernels.block import Block, Options
-from slipsweep.kernels.eq4 import eq4_integrals, lag_integrals
-from slipsweep.kernels.exact import MOST_STAGES, Workspace, inside, next_break
-from slipsweep.kernels.excitation import offset_at, phase_at
-from slipsweep.kernels.pulse import Pulse
-from slipsweep.kernels.series import Gain, series_of
-from slipsweep.motion.pieces import Wave
+from slipsweep.jit.decorators import scalar, single
+from slipsweep.kernels.base import offset_at, phase_at
+from slipsweep.kernels.eq4 import (
+    Block,
+    eq4_gains,
+    inflection,
+    lag_integrals,
+    opposite,
+    relative_acceleration,
+    relative_acceleration_root,
+    response,
+)
+from slipsweep.kernels.slide import (
+    MOST_STAGES,
+    SLIDES_ON,
+    Slide,
+    begin_pulse,
+    note_part,
+)
+from slipsweep.kernels.stick_slip import Place, attenuate, inside, next_break
+from slipsweep.motion.paths import Base, Path
 
 
 @scalar
-def zeros_on_one_side(block: Block, end: float, zeros: np.ndarray) -> int:
-    """Where on the way from Üg = 0 to `end` D changes its sign; their number, or −1 if one is not found."""
-    count = 0
-    x = math.copysign(0.0, end)
-    inner = inside(x, end)
-    if physics.inflection(block) <= 0.0 and physics.opposite(
-        physics.relative_acceleration(block, inner), physics.relative_acceleration(block, end)
-    ):
-        # D bends to one side only
-        zeros[0] = physics.relative_acceleration_root(block, inner, end)
-        return -1 if math.isnan(zeros[0]) else 1
-    for _ in range(MOST_STAGES):
-        target = next_break(block, x, end)
-        inner = inside(x, target)
-        if physics.opposite(
-            physics.relative_acceleration(block, inner),
-            physics.relative_acceleration(block, target),
-        ):
-            zeros[count] = physics.relative_acceleration_root(block, inner, target)
-            if math.isnan(zeros[count]):
-                return -1
-            count += 1
-        x = target
-        if x == end:
-            break
-    return count
+def find_velocity_extremes(block: Block, wants_peak: bool, path: Path, slide: Slide) -> None:
+    """Find the Üg, of either sign, at which D changes its sign, if the largest V is requested.
 
-
-@scalar
-def find_zeros(block: Block, wants_peak: bool, wave: Wave, workspace: Workspace) -> bool:
-    """Write where V may be largest, the zeros of D, into the workspace if that is wanted; whether all were found."""
+    V may be largest there.  They go into `zeros` of the slide; one that is not found is NaN.
+    """
+    # where E has no inflection D bends to one side only, and changes its sign once at most
+    bends = inflection(block) > 0.0
     for side in range(2):
-        workspace.zero_counts[side] = 0
-        if wants_peak:
-            end = block.amplitude * (wave.highest if side == 0 else wave.lowest)
-            workspace.zero_counts[side] = zeros_on_one_side(block, end, workspace.zeros[side])
-    return workspace.zero_counts[0] >= 0 and workspace.zero_counts[1] >= 0
+        count = 0
+        end = block.amplitude * (path.highest if side == 0 else path.lowest)
+        x = math.copysign(0.0, end)
+        for _ in range(MOST_STAGES if wants_peak else 0):
+            if x == end:
+                break
+            target = end
+            inner = inside(x, target)
+            at_end = relative_acceleration(block, target)
+            if bends or not opposite(relative_acceleration(block, inner), at_end):
+                target = next_break(block, x, end)
+                inner = inside(x, target)
+                at_end = relative_acceleration(block, target)
+            if opposite(relative_acceleration(block, inner), at_end):
+                slide.zeros[side, count] = relative_acceleration_root(block, inner, target)
+                count += 1
+            x = target
+        slide.zero_counts[side] = count
 
 
-@inlined
-def most_gained(
-    block: Block, wave: Wave, q: int, start: float, end: float, workspace: Workspace
-) -> float:
-    """The most that V gains on a part of piece q up to a zero of D (−∞, if it has none)."""
-    pieces = wave.pieces
-    amplitude = block.amplitude
-    highest = -math.inf
-    side = 0 if pieces[q].top > 0.0 else 1
-    first = amplitude * pieces[q].first
-    last = amplitude * pieces[q].last
-    for i in range(workspace.zero_counts[side]):
-        zero = workspace.zeros[side, i]
+@single
+def most_gained(block: Block, base: Base, p: int, start: float, end: float, slide: Slide) -> float:
+    """Return the most that V gains on a part of piece p up to a zero of D; −∞, if it has none."""
+    piece = base.pieces[p]
+    curve = base.curves[piece.curve]
+    side = 0 if piece.top > 0.0 else 1
+    first = block.amplitude * piece.first
+    last = block.amplitude * piece.last
+    most = -math.inf
+    for i in range(slide.zero_counts[side]):
+        zero = slide.zeros[side, i]
+        if math.isnan(zero):
+            return zero
         if min(first, last) < zero < max(first, last):
-            at = offset_at(pieces[q], amplitude, zero)
-            if start < at < end:
-                highest = max(highest, eq4_integrals(block, pieces[q], start, at)[0])
-    return highest
+            tau = offset_at(piece, curve, block.amplitude, zero)
+            if start < tau < end:
+                most = max(most, eq4_gains(block, piece, curve, start, tau, slide)[0])
+    return most
 
 
 @scalar
 def follow_eq4(
-    block: Block, wave: Wave, workspace: Workspace, p: int, tau: float, until: int, tau_until: float
-) -> Gain:
-    """Eq. 4 from rest, τ on piece p, to `tau_until` on piece `until`, by `lag_integrals`; a log has its parts."""
-    pieces = wave.pieces
-    log = workspace.log
-    logged = 0
-    velocity = 0.0
-    displacement = 0.0
-    peak = 0.0
+    block: Block, base: Base, start: Place, until: Place, slide: Slide, log: np.ndarray
+) -> None:
+    """Follow Eq. 4 from a place, where V and W are 0, to another one; the log has its parts."""
+    begin_pulse(slide, 0.0)
+    slide.kind = SLIDES_ON
     # apart, because over a symmetric cycle they cancel to the last digit
     above = 0.0
     below = 0.0
-    both = 0.0
-    for q in range(p, min(until + 1, pieces.shape[0])):
-        start = tau if q == p else pieces[q].begin
-        end = tau_until if q == until else pieces[q].finish
-        if not end > start:
+    drift = 0.0
+    velocity = 0.0
+    for p in range(start.piece, min(until.piece + 1, base.pieces.size)):
+        piece = base.pieces[p]
+        curve = base.curves[piece.curve]
+        begin = start.tau if p == start.piece else piece.begin
+        end = until.tau if p == until.piece else piece.finish
+        if not end > begin:
             continue
-        if log.size:
-            begins = phase_at(pieces[q], start)
-            ends = phase_at(pieces[q], end)
-            exact.note(
-                log[logged],
-                exact.SLIDE_ON,
-                q,
-                start,
-                begins,
-                ends,
-                math.nan,
-                velocity,
-                displacement,
-            )
-            logged += 1
-        peak = max(peak, velocity + most_gained(block, wave, q, start, end, workspace))
-        lag = lag_integrals(block, pieces[q], start, end)
-        upper = pieces[q].top > 0.0
-        side_g = block.g if upper else -block.g
-        displacement += (
-            velocity * (end - start) + side_g * lag.second + block.tan_theta * lag.second_x
+        note_part(slide, log, piece, begin, end)
+        if slide.zero_counts[0] + slide.zero_counts[1] > 0:
+            most = velocity + most_gained(block, base, p, begin, end, slide)
+            slide.peak = max(most, slide.peak)  # in this order a NaN is kept
+        lag = lag_integrals(block, piece, curve, begin, end, slide)
+        side_g = math.copysign(block.g, piece.top)
+        slide.displacement += (
+            velocity * (end - begin) + side_g * lag.second + block.tan_theta * lag.second_x
         )
-        above = above + (lag.first if upper else 0.0)
-        below = below + (0.0 if upper else lag.first)
-        both += lag.first_x
-        velocity = block.g * (above - below) + block.tan_theta * both
-        peak = max(peak, velocity)
-    workspace.logged[0] = logged
-    return Gain(velocity, displacement, peak)
+        if piece.top > 0.0:
+            above += lag.first
+        else:
+            below += lag.first
+        drift += lag.first_x
+        velocity = block.g * (above - below) + block.tan_theta * drift
+        slide.velocity = velocity
+        slide.peak = max(slide.peak, velocity)
 
 
 @scalar
-def _follow_cycle(
-    block: Block, wave: Wave, workspace: Workspace, c: int, p: int, tau: float
-) -> Gain:
-    return follow_eq4(block, wave, workspace, p, tau, wave.cycle[c + 1], -math.inf)
+def half_wave_after(path: Path, k: int) -> int:
+    """Return the first piece after the negative half wave that follows interval k at once.
+
+    A sample of exactly 0 between two negative ones is within the half wave.
+    """
+    p = path.intervals[k].end
+    while p < path.base.pieces.size and path.base.pieces[p].top < 0.0:
+        p += 1
+    return p
 
 
-_slide = series_of(_follow_cycle)
+@single
+def continuous_pulse(
+    block: Block,
+    path: Path,
+    k: int,
+    start: Place,
+    following: int,
+    next_place: Place,
+    velocity: float,
+    slide: Slide,
+    log: np.ndarray,
+) -> None:
+    """Go from Üg = Üy in interval k of a record, entered with a `velocity`, to the next pulse.
 
-
-@scalar
-def slide_continuously(block: Block, options: Options, wave: Wave, workspace: Workspace) -> Pulse:
-    """Continuous sliding from the first Üg ≥ Üy on, as one pulse."""
-    if not find_zeros(block, options.wants_peak, wave, workspace):
-        return Pulse(math.nan, math.nan, math.nan, 0.0, 0.0, 0)
-    return _slide(block, options, wave, workspace)
+    Eq. 4 holds through the negative half wave and, if the pulse of the `following` interval is next
+    to that, up to the pulse; else Eq. 12, with Ümax = E at the peak of the pulse, takes V to zero
+    from there on.  docs/records.md
+    """
+    count = path.base.pieces.size
+    until = half_wave_after(path, k)
+    place = Place(until, 0.0)
+    ends = path.base.pieces[count - 1].end
+    if until < count:
+        place = Place(until, path.base.pieces[until].begin)
+        ends = path.base.pieces[until].start
+    begins = math.inf
+    if next_place.piece < count:
+        begins = phase_at(path.base.pieces[next_place.piece], next_place.tau)
+        if following == k + 1 and path.intervals[following].first == until:
+            place = next_place
+            ends = begins
+    follow_eq4(block, path.base, start, place, slide, log)
+    began = phase_at(path.base.pieces[start.piece], start.tau)
+    slide.displacement += velocity * (ends - began)
+    slide.velocity += velocity
+    slide.peak += velocity
+    slide.velocity_before = 0.0
+    slide.slips = 1.0 if velocity == 0.0 else 0.0
+    if begins > ends:
+        held = response(block, block.amplitude * path.intervals[k].height)
+        attenuate(held, path.base.pieces[0], ends, begins - ends, slide, log)

@@ -7,9 +7,8 @@ array of dtype `CELL`.
 import numpy as np
 
 from slipsweep.jit.compiling import kernel
-from slipsweep.jit.decorators import inlined, single, uncounted
+from slipsweep.jit.decorators import inlined
 from slipsweep.kernels.block import FRICTION_ESTIMATED, Cell, Options, decay_rate_of, interface_of
-from slipsweep.motion.pieces import Wave
 
 #: The fields of `Cell` of the cells of a tile.
 CELL = np.dtype((np.record, [(name, np.float64) for name in Cell._fields]))
@@ -27,22 +26,6 @@ def cell_at(cells: np.ndarray, j: int) -> Cell:
         own.decay_rate,
         own.delta_mu,
         own.minimum_friction,
-    )
-
-
-@single
-def uncounted_wave(wave: Wave) -> Wave:
-    """The same wave (`decorators.uncounted`)."""
-    return Wave(
-        uncounted(wave.pieces),
-        uncounted(wave.cycle),
-        uncounted(wave.shape),
-        uncounted(wave.interval),
-        uncounted(wave.height),
-        wave.highest,
-        wave.lowest,
-        wave.lead,
-        wave.repeats,
     )
 
 

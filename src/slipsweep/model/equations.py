@@ -8,7 +8,7 @@ Table 1 (docs/tutorial.md, "Against the paper").
 
 import math
 
-from slipsweep.jit.decorators import inlined, registered
+from slipsweep.jit.decorators import equation, registered
 from slipsweep.jit.elementary import exp, log
 from slipsweep.model.variables import SlidingMode
 
@@ -20,19 +20,19 @@ CONTINUOUS = int(SlidingMode.CONTINUOUS)
 CONTINUOUS_MINIMUM_FRICTION = 0.01
 
 
-@inlined
+@equation
 def coulomb_yield_acceleration(mu_s: float, tan_theta: float, g: float) -> float:
     """Üy of a Coulomb interface, g tan(φs − θ), m/s²."""
     return g * (mu_s - tan_theta) / (1.0 + mu_s * tan_theta)
 
 
-@inlined
+@equation
 def normal_acceleration(ground_acceleration: float, tan_theta: float, g: float) -> float:
     """Eqs. 2 and 3: normal force over m cos θ, n(t) = g + Üg tan θ, m/s²."""
     return g + ground_acceleration * tan_theta
 
 
-@inlined
+@equation
 def mobilised_friction(
     ground_acceleration: float, block_acceleration: float, mu_s: float, tan_theta: float, g: float
 ) -> float:
@@ -43,7 +43,7 @@ def mobilised_friction(
     )
 
 
-@inlined
+@equation
 def lag(
     ground_acceleration: float, friction: float, mu_s: float, tan_theta: float, g: float
 ) -> float:
@@ -56,7 +56,7 @@ def lag(
     return g * (mu_s - friction) + drift(ground_acceleration, friction, mu_s, tan_theta)
 
 
-@inlined
+@equation
 def drift(ground_acceleration: float, friction: float, mu_s: float, tan_theta: float) -> float:
     """The part of `lag` that turns its sign with Üg, Üg tan θ (μs − tan θ − μ), m/s².
 
@@ -66,7 +66,7 @@ def drift(ground_acceleration: float, friction: float, mu_s: float, tan_theta: f
     return ground_acceleration * tan_theta * (mu_s - tan_theta - friction)
 
 
-@inlined
+@equation
 def relative_acceleration(
     ground_acceleration: float, friction: float, mu_s: float, tan_theta: float, g: float
 ) -> float:
@@ -76,7 +76,7 @@ def relative_acceleration(
     )
 
 
-@inlined
+@equation
 def relative_acceleration_slope(
     ground_acceleration: float,
     friction: float,
@@ -93,7 +93,7 @@ def relative_acceleration_slope(
     )
 
 
-@inlined
+@equation
 def relative_acceleration_curvature(
     ground_acceleration: float,
     friction_slope: float,
@@ -108,7 +108,7 @@ def relative_acceleration_curvature(
     )
 
 
-@inlined
+@equation
 def block_acceleration(
     ground_acceleration: float, friction: float, mu_s: float, tan_theta: float, g: float
 ) -> float:
@@ -126,13 +126,13 @@ def friction_coefficient(
     return (mu_s + delta_mu) * exp(-decay_rate * abs(ground_acceleration) / g)
 
 
-@inlined
+@equation
 def limit_denominator(mu_s: float, tan_theta: float) -> float:
     """Denominator of Eq. 7; where it is not positive the interface has no limit."""
     return 1.0 - tan_theta * (mu_s - tan_theta)
 
 
-@inlined
+@equation
 def limiting_acceleration(
     yield_acceleration: float, mu_s: float, tan_theta: float, g: float
 ) -> float:
@@ -140,26 +140,26 @@ def limiting_acceleration(
     return (yield_acceleration + g * mu_s) / limit_denominator(mu_s, tan_theta)
 
 
-@inlined
+@equation
 def acceleration_ratio(amplitude: float, limiting_acceleration: float) -> float:
     """Eq. 8: ξ, the base's peak acceleration over the limiting one."""
     return amplitude / limiting_acceleration
 
 
-@inlined
+@equation
 def minimum_friction(mu_s: float, ratio: float) -> float:
     """Eq. 9: friction that remains at the peak, μs² ξ in stick-slip, 0.01 in continuous sliding."""
     return mu_s * mu_s * ratio if ratio <= 1.0 else CONTINUOUS_MINIMUM_FRICTION
 
 
-@inlined
+@equation
 def delta_mu(mu_s: float, ratio: float) -> float:
     """Eqs. 10 (continuous, ξ > 1) and 11 (stick-slip, ξ ≤ 1): friction above static."""
     # without a branch, which would keep loops over cells from becoming SIMD
     return mu_s * (max(ratio, 1.0 / ratio) - 1.0)
 
 
-@inlined
+@equation
 def decay_rate(
     amplitude: float, mu_s: float, delta_mu: float, minimum_friction: float, g: float
 ) -> float:
@@ -167,13 +167,13 @@ def decay_rate(
     return g / amplitude * log((mu_s + delta_mu) / minimum_friction)
 
 
-@inlined
+@equation
 def attenuated_velocity(velocity: float, peak_block_acceleration: float, duration: float) -> float:
     """Eq. 12: relative velocity after `duration`, with g Kd = Ümax, not below zero; the rate is constant: one step."""
     return max(velocity - peak_block_acceleration * duration, 0.0)
 
 
-@inlined
+@equation
 def attenuated_displacement(
     velocity: float, peak_block_acceleration: float, duration: float
 ) -> float:
@@ -185,7 +185,7 @@ def attenuated_displacement(
     )
 
 
-@inlined
+@equation
 def sliding_mode(amplitude: float, yield_acceleration: float, limiting_acceleration: float) -> int:
     """Mode of the motion: stuck up to the yield acceleration, continuous beyond Eq. 7, else stick-slip."""
     slides = CONTINUOUS if amplitude > limiting_acceleration else STICK_SLIP

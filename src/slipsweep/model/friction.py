@@ -1,48 +1,15 @@
-"""Friction laws: the friction coefficient as a function of the base's acceleration.
+"""What the exact kernels need of Eq. 6 besides its value: derivatives, places and integrals.
 
-A law is a few small functions.  The stepping kernel (`kernels.step`) needs μ(|Üg|) alone, of any
-law that falls; the exact kernel (`kernels.exact`) needs the others, too (`FrictionLaw.missing`
-names those that a law lacks).  The law of the paper is `exponential`, Eq. 6; its original law, Eq.
-5, is Eq. 6 with Δμ = 0.  To add a law: CONTRIBUTING.md.
+The stepping kernel (`kernels.step`) takes any law μ(Üg, v) and needs none of these.
 """
 
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple
 
 import numpy as np
 
-from slipsweep.jit.decorators import inlined, registered
+from slipsweep.jit.decorators import equation, registered
 from slipsweep.jit.elementary import exp, log
 from slipsweep.model import equations as eq
-
-
-class FrictionLaw(NamedTuple):
-    """What the kernels need of a friction law: jitted functions of the numbers behind them.
-
-    μs, Δμ and λ are the parameters of every law (`mu_s`, `delta_mu`, `decay_rate`); what λ means is
-    the law's own.
-    """
-
-    friction: Callable[
-        ..., float
-    ]  # (ground_acceleration, mu_s, delta_mu, decay_rate, g): μ at Üg of either sign
-    derivatives: Any = (
-        None  # (friction, decay_rate, g): dμ/d|Üg| and d²μ/d|Üg|², where the law gives `friction`
-    )
-    inflection: Any = None  # (tan_theta, decay_rate, g): Üg up to which Ü of Eq. 4 is concave; it is convex beyond
-    static_acceleration: Any = None  # (mu_s, delta_mu, decay_rate, g): |Üg| at which μ is μs
-    #: (start, change, mu_s, delta_mu, decay_rate, g): ∫ μ times 1, 1 − w, w and w (1 − w) over w
-    #: from 0 to 1, where |Üg| = start + w change
-    moments: Any = None
-    decay_length: Any = (
-        None  # (decay_rate, g): the change of |Üg| over which μ falls to a part 1/e, or less
-    )
-
-    @property
-    def missing(self) -> tuple[str, ...]:
-        """Names of the functions that the exact kernel needs and the law does not give."""
-        return tuple(name for name, function in self._asdict().items() if function is None)
 
 
 @registered
@@ -82,7 +49,7 @@ _DECAYED = 708.0
 _SERIES = np.array([1.0 / math.factorial(k + 3) for k in range(21)])
 
 
-@inlined
+@equation
 def moments_of_decay(z: float) -> tuple[float, float, float, float]:
     """∫ e^(−zw) times 1, 1 − w, w and w (1 − w) over w from 0 to 1, for z ≥ 0.
 
@@ -116,16 +83,3 @@ def exponential_moments(
     whole, larger, smaller, both = moments_of_decay(decay_rate / g * abs(change))
     early, late = (smaller, larger) if change < 0.0 else (larger, smaller)
     return largest * whole, largest * early, largest * late, largest * both
-
-
-@inlined
-def exponential() -> FrictionLaw:
-    """Eq. 6, μ = (μs + Δμ) exp(−λ|Üg|/g), and with Δμ = 0 Eq. 5: the law of the paper."""
-    return FrictionLaw(
-        eq.friction_coefficient,
-        exponential_derivatives,
-        exponential_inflection,
-        exponential_static_acceleration,
-        exponential_moments,
-        exponential_decay_length,
-    )

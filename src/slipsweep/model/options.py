@@ -7,6 +7,7 @@ from typing import ClassVar, Literal, TypeAlias
 from slipsweep.errors import InputError
 from slipsweep.model.choices import Choice, Family, option
 from slipsweep.model.parameters import GRAVITY
+from slipsweep.model.variables import NEWMARK_REFERENCE, REFERENCE
 
 Rule: TypeAlias = Literal["rectangle", "trapezoid", "simpson"]
 
@@ -48,6 +49,7 @@ class Mendez(Choice):
     """
 
     name: ClassVar[str] = "mendez"
+    reference: ClassVar[str] = REFERENCE
     rise: Literal["monotone", "literal"] = option("rise of the block's acceleration", "monotone")
     recoupling: Literal["eq12", "integrate"] = option(
         "rule by which the block re-sticks after the base has reversed", "eq12"
@@ -57,10 +59,13 @@ class Mendez(Choice):
 
 @dataclass(frozen=True)
 class Newmark(Choice):
-    """Newmark's rigid block [1]_: its acceleration is Üy while it slides, and the base's while it does not.
+    """Newmark's rigid block [1]_: its acceleration is Üy while it slides, the base's while it rests.
 
     Parameters
     ----------
+    sliding : {"downslope", "both"}
+        Directions in which it slides.  With "both" its acceleration is −Üy,up while it slides
+        upslope (`upslope_yield_acceleration`); displacements may then be negative.
     g : float
         Gravity, m/s².
 
@@ -82,10 +87,14 @@ class Newmark(Choice):
     --------
     >>> import slipsweep
     >>> slipsweep.Newmark()
-    Newmark(g=9.81)
+    Newmark(sliding='downslope', g=9.81)
     """
 
     name: ClassVar[str] = "newmark"
+    reference: ClassVar[str] = NEWMARK_REFERENCE
+    sliding: Literal["downslope", "both"] = option(
+        "directions in which Newmark's block slides", "downslope"
+    )
     g: float = option("gravity, m/s²", GRAVITY)
 
 
@@ -109,14 +118,15 @@ class Cycle(Choice):
 
 @dataclass(frozen=True)
 class Step(Choice):
-    """The solver that takes fixed steps in phase, cut at the events inside them.
+    """The solver that takes steps in time, cut where a phase of the motion ends.
 
     Parameters
     ----------
     rule : {"rectangle", "trapezoid", "simpson"}
         Orders 1, 2 and 4.
     steps_per_cycle : int
-        A multiple of 4, at least 8.
+        A multiple of 4, at least 8.  Under a record there is one step between two samples for each
+        64 of them, rounded up.
 
     Raises
     ------
@@ -147,6 +157,19 @@ class Step(Choice):
 
 
 Model = Mendez | Newmark
+
+
+def slides_both_ways(model: Model) -> bool:
+    """Return whether the model is Newmark's block that slides downslope and upslope."""
+    return isinstance(model, Newmark) and model.sliding == "both"
+
+
+def check_one_way(name: str, sliding: object) -> None:
+    """Refuse what takes displacements in one direction only."""
+    if sliding == "both":
+        raise InputError(f"{name}: not allowed with sliding = 'both', only with 'downslope'")
+
+
 Solver = Cycle | Step
 
 MODELS: Family[Model] = Family("model", "friction", (Mendez, Newmark), "mendez", "model")

@@ -72,7 +72,15 @@ BOUNDS: dict[str, Bound] = {
     **dict.fromkeys(("amplitude", "displacement_amplitude"), _NOT_NEGATIVE),
     **dict.fromkeys(("mu_s", "minimum_friction", "scale", "time_scale", "displacement"), _POSITIVE),
     **dict.fromkeys(
-        ("frequency", "structure_frequency", "maximum_amplitude", "g", "interval"), _POSITIVE
+        (
+            "frequency",
+            "structure_frequency",
+            "maximum_amplitude",
+            "upslope_yield_acceleration",
+            "g",
+            "interval",
+        ),
+        _POSITIVE,
     ),
 }
 

@@ -13,6 +13,10 @@ REFERENCE = (
     "frictional interfaces under harmonic loading, Soil Dynamics and Earthquake Engineering "
     "32, 152-158, https://doi.org/10.1016/j.soildyn.2011.08.007"
 )
+NEWMARK_REFERENCE = (
+    "N. M. Newmark (1965), Effects of earthquakes on dams and embankments, Géotechnique 15, "
+    "139-160, https://doi.org/10.1680/geot.1965.15.2.139"
+)
 
 
 class SlidingMode(IntEnum):
@@ -53,6 +57,9 @@ FLAG_KIND_TEXT: dict[FlagKind, str] = {
     FlagKind.CAUTION: "an assumption of the model is violated",
     FlagKind.NOTE: "no assumption is violated; a special rule or an estimate was used",
 }
+
+#: What is said of cells that have lost their flags.
+UNFLAGGED_TEXT = "another program has masked or joined these cells, and left them without flags"
 
 
 class Validity(IntFlag):
@@ -218,6 +225,7 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "frequency": _cf("Hz", "excitation frequency"),
     "yield_acceleration": _cf("m s-2", "yield acceleration"),
     "yield_coefficient": _cf("1", "yield coefficient, yield acceleration over g"),
+    "upslope_yield_acceleration": _cf("m s-2", "yield acceleration upslope"),
     "decay_rate": _cf("1", "friction decay with loading rate"),
     "delta_mu": _cf("1", "friction above static"),
     "minimum_friction": _cf("1", "minimum friction coefficient"),
@@ -261,8 +269,20 @@ STRENGTHS = ("amplitude", "scale", "pgv", "arias_intensity")
 
 #: Inputs that may be drawn: all that the displacement depends on.
 DRAWN = tuple(
-    name for name in PARAMETERS if name not in ("structure_frequency", "polarity", "azimuth")
+    name
+    for name in PARAMETERS
+    if name not in ("structure_frequency", "polarity", "azimuth", "upslope_yield_acceleration")
 )
+
+#: Results of Newmark's block that slides both ways: extremes of u over time.
+EXTREMES: dict[str, dict[str, Any]] = {
+    "largest_displacement": _cf(
+        "m", "largest relative displacement over time, downslope", "validity", comment=_DIRECTION
+    ),
+    "smallest_displacement": _cf(
+        "m", "smallest relative displacement over time, downslope", "validity", comment=_DIRECTION
+    ),
+}
 
 #: Results of a sweep: attributes of the variables.
 RESULTS: dict[str, dict[str, Any]] = {
@@ -275,6 +295,7 @@ RESULTS: dict[str, dict[str, Any]] = {
     "newmark_displacement": _cf(
         "m", "permanent displacement of Newmark's block, downslope", "validity", comment=_DIRECTION
     ),
+    **EXTREMES,
     "yield_acceleration": _cf("m s-2", "yield acceleration"),
     "limiting_acceleration": _cf("m s-2", "limiting acceleration (Eq. 7)"),
     "acceleration_ratio": _cf("1", "peak ground over limiting acceleration"),
@@ -316,7 +337,7 @@ RECORD_COUNTS: dict[str, dict[str, Any]] = {
 RECORD_RESULTS: dict[str, dict[str, Any]] = {
     **{name: RESULTS[name] for name in ("permanent_displacement", "peak_relative_velocity")},
     **RECORD_COUNTS,
-    **{name: RESULTS[name] for name in ("validity", "newmark_displacement")},
+    **{name: RESULTS[name] for name in ("validity", "newmark_displacement", *EXTREMES)},
     "motion_factor": _cf("1", "factor on the recorded acceleration"),
 }
 
@@ -431,6 +452,18 @@ HAZARD_RESULTS: dict[str, dict[str, Any]] = {
     "lower_rate": _cf("year-1", "annual rate with the lower probability of each two amplitudes"),
     "upper_rate": _cf("year-1", "annual rate with the higher probability of each two amplitudes"),
     "valueless_share": _cf("1", "largest share of the motions without a value at any amplitude"),
+}
+
+#: What published equations add to statistics and annual rates.
+PUBLISHED_RESULTS: dict[str, dict[str, Any]] = {
+    "in_range": {
+        "long_name": "whether the inputs lie in the range of the equation",
+        "flag_values": [0, 1],
+        "flag_meanings": "outside inside",
+    },
+    "outside_rate": _cf(
+        "year-1", "part of the annual rate for which the equation is used outside of its range"
+    ),
 }
 
 #: dtype of each result; everything else is float64.

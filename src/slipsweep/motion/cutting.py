@@ -17,14 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.motion.intensity import spacing_of
+from slipsweep.motion.paths import TERMS, Path, path_of
 from slipsweep.motion.pieces import Wave, pieces_of, wave_of_pieces
 from slipsweep.motion.records import Record
 from slipsweep.motion.waveforms import Harmonics, Waveform
 
-#: Longest piece of a smooth wave, in radians of its fastest harmonic, and terms of its Taylor
-#: series about the anchor: the first one beyond is 1.3e-18 (docs/numerics.md#pieces-of-a-wave).
+#: Longest piece of a smooth wave, in radians of its fastest harmonic: the first term of its Taylor
+#: series that is left out is 1.3e-18 (docs/numerics.md#pieces-of-a-wave).
 _LONGEST = 0.5 * math.pi
-TERMS = 22
 
 #: Points of a cycle closer than this, as parts of it, are one; so are values of w closer than the
 #: second.
@@ -231,10 +231,16 @@ def wave_of(waveform: Waveform) -> Wave:
     return wave_of_pieces(table, np.cumsum([0, *counts]), shape, lead, repeats)
 
 
-#: Tables of pieces that are kept, and bytes of a sample in one, about: a line through zero is two
-#: pieces.
+@functools.lru_cache(maxsize=32)
+def path_of_waveform(waveform: Waveform) -> Path:
+    """Return the path of a waveform."""
+    return path_of(wave_of(waveform), recorded=False)
+
+
+#: Tables of pieces that are kept, and bytes of a sample in one and its path, about: a line through
+#: zero is two pieces.
 MOST_TABLES = 16
-TABLE_BYTES = 160
+TABLE_BYTES = 280
 
 
 @functools.lru_cache(maxsize=MOST_TABLES)
@@ -261,3 +267,9 @@ def wave_of_record(record: Record, polarity: float) -> Wave:
         coefficients=np.where(first == last, 0.0, (change / spacing)[own])[:, np.newaxis],
     )
     return wave_of_pieces(pieces, cycle=[0, own.size], shape=[0])
+
+
+@functools.lru_cache(maxsize=MOST_TABLES)
+def path_of_record(record: Record, polarity: float) -> Path:
+    """Return the path of a record: w in m/s², and time in place of the phase."""
+    return path_of(wave_of_record.__wrapped__(record, polarity), recorded=True)

@@ -96,12 +96,13 @@ def significant_duration(times: Floats, acceleration: Floats) -> float:
         return 0.0
 
     def reached(share: float) -> float:
-        return brentq(
+        time: float = brentq(
             lambda time: float(energy(time)) - share * total,
             first,
             last,
             xtol=1e-15 * (last - first),
         )
+        return time
 
     return reached(0.95) - reached(0.05)
 
@@ -160,7 +161,7 @@ def _energy(times: Floats, acceleration: Floats) -> "PPoly":
 
 def _zeros(curve: "PPoly") -> Floats:
     """Where a curve is zero; a piece that is zero throughout has none."""
-    found = curve.roots(discontinuity=False, extrapolate=False)
+    found: Floats = curve.roots(discontinuity=False, extrapolate=False)
     return found[np.isfinite(found)]
 
 

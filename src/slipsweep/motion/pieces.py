@@ -1,6 +1,6 @@
 """The table of pieces that every motion of the base ends as.
 
-`slipsweep.motion.cutting` cuts waveforms and records into pieces, `slipsweep.kernels.excitation`
+`slipsweep.motion.cutting` cuts waveforms and records into pieces, `slipsweep.kernels.base`
 evaluates them.
 """
 

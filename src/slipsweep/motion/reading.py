@@ -15,7 +15,10 @@ Unit: TypeAlias = Literal["m/s2", "g", "cm/s2", "gal"]
 Baseline: TypeAlias = Literal["none", "mean", "linear"]
 Gaps: TypeAlias = Literal["refuse", "linear"]
 Implausible: TypeAlias = Literal["refuse", "accept"]
-Format: TypeAlias = Literal["auto", "csv", "values", "at2", "esm", "cosmos", "knet"]
+Format: TypeAlias = Literal[
+    "auto", "csv", "columns", "values", "at2", "esm", "cosmos", "knet", "asa"
+]
+Vertical: TypeAlias = Literal["leave_out", "accept"]
 
 
 @dataclass(frozen=True)
@@ -32,5 +35,5 @@ class Reading(Choice):
     )
     format: Format = option("format of the file", "auto")
     channel: int | None = option(
-        "channel of acceleration in a COSMOS file that holds several, from 1", None, least=1
+        "channel of acceleration in a file that holds several, from 1", None, least=1
     )

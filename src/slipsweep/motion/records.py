@@ -11,7 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from slipsweep.errors import InputError
 from slipsweep.model.parameters import LARGEST, check_choice, check_numbers, check_single, shown
 from slipsweep.motion import formats
+from slipsweep.motion.headings import vertical_mark
 from slipsweep.motion.intensity import Floats, peak_displacement, peak_velocity
+from slipsweep.motion.lines import read_lines
 from slipsweep.motion.reading import (
     STANDARD_GRAVITY,
     UNITS,
@@ -42,6 +44,16 @@ _HELD_SAMPLES = 20
 #: vertically.
 _WEAKEST = 0.001
 _STRONGEST = 3.0
+
+#: A record is flat at its largest or smallest value, as if clipped, where so many samples in a row
+#: have it, the one before or after is more than so many of the smallest steps away, and the value
+#: is more than this share of the peak.
+_FLAT_SAMPLES = 3
+_FLAT_STEPS = 2.0
+_FLAT_SHARE = 0.1
+
+#: Share of samples that are exactly 0 from which a record is said to have them.
+_ZEROS = 0.4
 
 #: Displacement of the ground (m) that is a drift where the velocity at the end is more than a share
 #: of the peak's, and one that is a drift anyhow: the largest along a fault are 9.
@@ -170,7 +182,10 @@ class Record:
         values = check_numbers("trace.data", np.ma.filled(data, np.nan))
         times = interval * np.arange(values.size, dtype=np.float64)
         reading = Reading(baseline=baseline, gaps=gaps, implausible=implausible)
-        return _inspected(own, times, values, units, reading, {"record_format": "obspy"})
+        attrs = {"record_format": "obspy"}
+        if vertical := vertical_mark(str(trace.id).rpartition(".")[2]):  # the channel's code
+            attrs["record_vertical"] = vertical
+        return _inspected(own, times, values, units, reading, attrs)
 
     def corrected(self, baseline: Baseline) -> "Record":
         """The record less a constant ("mean") or a straight line ("linear", least squares); "none" leaves it."""
@@ -181,7 +196,7 @@ class Record:
         return replace(self, acceleration=values, attrs=self.attrs | {"baseline": baseline})
 
     def summary(self) -> str:
-        """One line: duration, interval, peak ground acceleration and velocity, the unit that it was read in.
+        """One line: duration, interval, peak ground acceleration and velocity, unit, cautions.
 
         Examples
         --------
@@ -189,7 +204,11 @@ class Record:
         >>> slipsweep.read_record("sweeps/data/synthetic.csv").summary()
         'sweeps/data/synthetic.csv: 20 s at 0.01 s, PGA 0.35 g, PGV 0.412 m/s, read in g'
         """
-        notes = {", read in ": "record_units", "; accepted: ": "record_accepted"}
+        notes = {
+            ", read in ": "record_units",
+            "; accepted: ": "record_accepted",
+            "; caution: ": "record_caution",
+        }
         read = "".join(
             text + self.attrs[name] for text, name in notes.items() if name in self.attrs
         )
@@ -250,12 +269,15 @@ def read_record(
     implausible : {"refuse", "accept"}
         A peak above 3 g or below 0.001 g, which is often that of a wrong unit, and ground that
         drifts by metres.
-    format : {"auto", "csv", "values", "at2", "esm", "cosmos", "knet"}
-        "auto" looks into the file; "values" are accelerations alone; "cosmos" is the Strong Motion
-        Data Format 1.20 of the Consortium of Organizations for Strong-Motion Observation Systems
-        (2001).
+    format : {"auto", "csv", "columns", "values", "at2", "esm", "cosmos", "knet", "asa"}
+        "auto" looks into the file.  Plain text: "csv" has a column of times, "columns" are
+        components side by side without times, "values" is one component, line after line.
+        "cosmos" is the Strong Motion Data Format 1.20 of the Consortium of Organizations for
+        Strong-Motion Observation Systems (2001), "asa" the Archivo Estándar de Aceleración 2.0 of
+        the Mexican networks.
     channel : int, optional
-        Which channel of acceleration in a COSMOS file, from 1; needed where it holds several.
+        Which acceleration of a file that holds several, from 1 in the order of the file; needed
+        there.
 
     Returns
     -------
@@ -266,6 +288,11 @@ def read_record(
     InputError
         The file cannot be read, or something in it is no record: with the number of the line, or
         the time.
+
+    Notes
+    -----
+    What looks like clipping, samples of which many are 0, and a vertical component are read, and
+    said by `Record.summary` (attribute `record_caution`).
 
     See Also
     --------
@@ -280,12 +307,14 @@ def read_record(
     """
     reading = Reading(units, interval, baseline, gaps, implausible, format, channel)
     path = Path(path)
-    digest, lines = formats.read_lines(path)
-    kind, times, values, unit = formats.read_samples(path, lines, reading)
+    digest, lines = read_lines(path)
+    kind, samples, unit = formats.read_samples(path, lines, reading)
     attrs = {"record": path.name, "record_format": kind, "record_sha256": digest}
     if reading.channel is not None:
         attrs["record_channel"] = str(reading.channel)
-    return _inspected(str(path), times, values, unit, reading, attrs)
+    if vertical := vertical_mark(samples.component, path):
+        attrs["record_vertical"] = vertical
+    return _inspected(str(path), samples.times, samples.values, unit, reading, attrs)
 
 
 def _inspected(
@@ -303,10 +332,12 @@ def _inspected(
     odd = "; ".join(_implausible(record, unit))
     if odd and reading.implausible == "refuse":
         raise InputError(f"{name}: {odd}; or implausible = 'accept' takes the record as it is")
-    accepted = "; ".join(filter(None, (missing, odd)))
-    return (
-        replace(record, attrs=record.attrs | {"record_accepted": accepted}) if accepted else record
-    )
+    cautions = [f"vertical component ({mark})"] if (mark := attrs.get("record_vertical")) else []
+    said = {
+        "record_accepted": "; ".join(filter(None, (missing, odd))),
+        "record_caution": "; ".join((*cautions, *_cautions(times[kept], values[kept], unit))),
+    }
+    return replace(record, attrs=record.attrs | {name: text for name, text in said.items() if text})
 
 
 def missing_samples(times: Floats, values: Floats) -> Iterator[str]:
@@ -345,7 +376,8 @@ def _is_fill(values: Floats) -> NDArray[np.bool_]:
         and magnitude.max(initial=0.0) > 20.0 * rest > 0.0
         and values.size > _FEWEST
     )
-    return missing | (largest & is_alone)
+    fill: NDArray[np.bool_] = missing | (largest & is_alone)
+    return fill
 
 
 def _held(times: Floats, values: Floats) -> Iterator[str]:
@@ -394,3 +426,28 @@ def _implausible(record: Record, unit: str) -> Iterator[str]:
         )
         at_end = f"a velocity of {end:.3g} m/s at t = {times[-1]:.6g} s"
         yield f"the ground moves {displacement:.3g} m and has {at_end}: {drift}"
+
+
+def _cautions(times: Floats, values: Floats, unit: str) -> Iterator[str]:
+    """Signs that a record was clipped, or that half of it is missing: said, not refused."""
+    if values.size <= _FEWEST:
+        return
+    zeros = float((values == 0.0).mean())
+    if zeros >= _ZEROS:
+        yield f"{zeros:.0%} of its samples are 0"
+    steps = np.abs(np.diff(values))
+    least = steps[steps > 0.0].min(initial=np.inf)
+    peak = np.abs(values).max()
+    for level in (values.max(), values.min()):
+        at_level = np.concatenate([[False], values == level, [False]])
+        starts, ends = np.flatnonzero(np.diff(at_level)).reshape(-1, 2).T
+        # the steps onto the level and off it; there is none at the ends of the record
+        step = np.concatenate([[0.0], steps, [0.0]])
+        sharp = np.maximum(step[starts], step[ends]) > _FLAT_STEPS * least
+        flat = np.flatnonzero((ends - starts >= _FLAT_SAMPLES) & sharp)
+        if flat.size and abs(level) > _FLAT_SHARE * peak:
+            samples = int((ends - starts)[flat].sum())
+            where = f"first at t = {times[starts[flat[0]]]:.6g} s"
+            extreme = "largest" if level > 0.0 else "smallest"
+            at = f"flat at its {extreme} value {level:.4g} {unit}"
+            yield f"{at} ({samples} samples, {where}): it may be clipped"

@@ -14,8 +14,8 @@ from slipsweep.errors import InputError
 from slipsweep.model.parameters import check_choice, check_finite, check_list, check_numbers, shown
 from slipsweep.model.units import conversion
 from slipsweep.model.variables import HISTORY
-from slipsweep.motion.formats import read_columns, read_lines
 from slipsweep.motion.intensity import Floats
+from slipsweep.motion.lines import read_columns, read_lines
 from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS
 from slipsweep.motion.records import check_samples, missing_samples
 

@@ -2,21 +2,30 @@
 
 import glob
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.errors import InputError, did_you_mean
-from slipsweep.model.parameters import check_list, check_single, shown
+from slipsweep.model.parameters import check_choice, check_list, check_single, shown
 from slipsweep.model.variables import INTENSITY_MEASURES
+from slipsweep.motion.headings import vertical_mark
 from slipsweep.motion.intensity import Floats, intensity_measures
-from slipsweep.motion.reading import Baseline, Format, Gaps, Implausible, Reading, Unit
+from slipsweep.motion.reading import (
+    Baseline,
+    Format,
+    Gaps,
+    Implausible,
+    Reading,
+    Unit,
+    Vertical,
+)
 from slipsweep.motion.records import Record, read_record
 
 
@@ -121,6 +130,8 @@ class Suite:
         components').
     name : str
         What the suite is called in results.
+    left_out : tuple of str
+        Files of vertical components that `read_suite` found and left out.
 
     Raises
     ------
@@ -143,6 +154,7 @@ class Suite:
     motions: tuple[Motion, ...]
     labels: tuple[str, ...] = ()
     name: str = "suite"
+    left_out: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         motions = tuple(self.motions)
@@ -168,7 +180,8 @@ class Suite:
     def __repr__(self) -> str:
         labels = self.labels if len(self) <= 6 else (*self.labels[:3], "...", *self.labels[-2:])
         what = f"{'pair' if self.has_pairs else 'motion'}{'s' if len(self) > 1 else ''}"
-        return f"Suite({self.name!r}: {len(self)} {what}: {', '.join(labels)})"
+        left_out = f"; left out: {', '.join(self.left_out)}" if self.left_out else ""
+        return f"Suite({self.name!r}: {len(self)} {what}: {', '.join(labels)}{left_out})"
 
     def __len__(self) -> int:
         return len(self.motions)
@@ -186,6 +199,7 @@ class Suite:
             tuple(self.motions[at] for at in places),
             tuple(self.labels[at] for at in places),
             self.name,
+            self.left_out,
         )
 
     def index(self, which: str | int) -> int:
@@ -244,6 +258,8 @@ class Suite:
     def attrs(self) -> dict[str, Any]:
         """What results say of the suite: how many motions, how all were read if alike, and which are the same."""
         about: dict[str, Any] = {"suite": self.name, "motions": len(self)}
+        if self.left_out:
+            about["left_out_vertical"] = ", ".join(self.left_out)
         for name in ("record_format", "record_units", "baseline"):
             values = {one.attrs.get(name) for one in self.components}
             if len(values) == 1 and None not in values:
@@ -259,8 +275,19 @@ class Suite:
         return about
 
     def summary(self) -> str:
-        """One line a record, as `Record.summary`."""
-        return "\n".join(one.summary() for one in self.components)
+        """One line a record, as `Record.summary`, and one on what was left out."""
+        lines = [record.summary() for record in self.components]
+        if self.left_out:
+            lines.append(
+                f"left out, vertical components: {', '.join(self.left_out)}; "
+                "vertical = 'accept' takes them"
+            )
+        return "\n".join(lines)
+
+    def cautions(self) -> list[str]:
+        """A line for each record of which something may be wrong."""
+        said = {record.name: record.attrs.get("record_caution") for record in self.components}
+        return [f"caution: {name}: {text}" for name, text in said.items() if text]
 
 
 def read_suite(
@@ -274,6 +301,7 @@ def read_suite(
     implausible: Implausible = "refuse",
     format: Format = "auto",
     channel: int | None = None,
+    vertical: Vertical = "leave_out",
 ) -> Suite:
     """Read a suite of recorded motions.
 
@@ -291,6 +319,9 @@ def read_suite(
         at 90 degrees.
     units, interval, baseline, gaps, implausible, format, channel
         As `read_record`, for every file.
+    vertical : {"leave_out", "accept"}
+        Files of vertical components, known by their headers and names (UP, UD, DWN, V, VERT, Z,
+        HNZ): left out, and named in `Suite.left_out`, or taken as motions.
 
     Returns
     -------
@@ -301,7 +332,7 @@ def read_suite(
     ------
     InputError
         Any file cannot be read, or is no record: all of them are named.  A pattern that fits no
-        file, a folder without one, or a component without the other.
+        file, a folder without one, a component without the other, or vertical components only.
 
     See Also
     --------
@@ -315,36 +346,69 @@ def read_suite(
     >>> slipsweep.read_suite("sweeps/data/suite", pairs=("_H1", "_H2"))
     Suite('sweeps/data/suite': 4 pairs: rock-far, rock-near, soft-far, stiff-pulse)
     """
-    return suite_in(
-        Path(), paths, pairs, Reading(units, interval, baseline, gaps, implausible, format, channel)
-    )
+    reading = Reading(units, interval, baseline, gaps, implausible, format, channel)
+    return suite_in(Path(), paths, pairs, reading, vertical)
 
 
-def suite_in(folder: Path, paths: Any, pairs: Sequence[str] | None, reading: Reading) -> Suite:
+def suite_in(
+    folder: Path,
+    paths: Any,
+    pairs: Sequence[str] | None,
+    reading: Reading,
+    vertical: Vertical = "leave_out",
+) -> Suite:
     """`read_suite` of paths that are relative to a folder, whose own name is not read as a pattern."""
+    check_choice("vertical", vertical, get_args(Vertical))
     sources = _sources(paths, folder)
+    files = [part for part in dict.fromkeys(chain.from_iterable(sources)) if isinstance(part, Path)]
+    # what its name says to be vertical need not be read
+    marks = {file: vertical_mark("", file) for file in files} if vertical == "leave_out" else {}
+    records = _read([file for file in files if not marks.get(file)], reading)
+    if vertical == "leave_out":
+        marks |= {file: record.attrs.get("record_vertical") for file, record in records.items()}
+    left_out = {file: f"{file.name} ({mark})" for file, mark in marks.items() if mark}
+    sources = _horizontal(sources, left_out)
     sources, labels = (sources, ()) if pairs is None else _paired(sources, pairs)
-    records = dict[Path | Record, Record]()
-    reasons = dict[Path | Record, str]()
-    for part in dict.fromkeys(chain.from_iterable(sources)):
+    found = [
+        [part if isinstance(part, Record) else records[part] for part in source]
+        for source in sources
+    ]
+    motions = tuple(Pair(*parts) if len(parts) == 2 else parts[0] for parts in found)
+    entry = paths[0] if isinstance(paths, (list, tuple)) and len(paths) == 1 else paths
+    name = str(entry) if isinstance(entry, (str, Path)) else "suite"
+    return Suite(motions, labels, name, tuple(left_out.values()))
+
+
+def _read(files: Sequence[Path], reading: Reading) -> dict[Path, Record]:
+    """The records in files (InputError: all files that hold none, with the reasons)."""
+    records = dict[Path, Record]()
+    reasons = dict[Path, str]()
+    for file in files:
         try:
-            records[part] = (
-                part if isinstance(part, Record) else read_record(part, **reading.options)
-            )
+            records[file] = read_record(file, **reading.options)
         except InputError as error:
-            reasons[part] = str(error)
+            reasons[file] = str(error)
     if reasons:
-        names = ", ".join(part.name for part in reasons)
+        names = ", ".join(file.name for file in reasons)
         refused = InputError(
             f"{len(reasons)} of {len(reasons) + len(records)} files cannot be read: {names}"
         )
         for reason in reasons.values():
             refused.add_note(reason)
         raise refused
-    found = [[records[part] for part in source] for source in sources]
-    motions = tuple(Pair(*parts) if len(parts) == 2 else parts[0] for parts in found)
-    entry = paths[0] if isinstance(paths, (list, tuple)) and len(paths) == 1 else paths
-    return Suite(motions, labels, str(entry) if isinstance(entry, (str, Path)) else "suite")
+    return records
+
+
+def _horizontal(sources: list[_Source], vertical: Mapping[Path, str]) -> list[_Source]:
+    """The sources without vertical components (InputError: a pair has one, or nothing is left)."""
+    kept = [source for source in sources if not any(part in vertical for part in source)]
+    names = ", ".join(vertical.values())
+    advice = "vertical = 'accept' takes them"
+    if any(len(source) == 2 and source not in kept for source in sources):
+        raise InputError(f"paths: vertical components in pairs: {names}; {advice}")
+    if not kept:
+        raise InputError(f"paths: vertical components only: {names}; {advice}")
+    return kept
 
 
 def _components(motion: Motion) -> tuple[Record, ...]:

@@ -68,6 +68,7 @@ def sweep(
     azimuth: Values | None = None,
     yield_acceleration: Values | None = None,
     yield_coefficient: Values | None = None,
+    upslope_yield_acceleration: Values | None = None,
     decay_rate: Values | None = None,
     delta_mu: Values | None = None,
     minimum_friction: Values | None = None,
@@ -123,6 +124,10 @@ def sweep(
         Üy, m/s²; by default Coulomb's, g tan(φs − θ).
     yield_coefficient : float, array or DataArray, optional
         ky = Üy/g of Newmark's block, instead of `theta`, `mu_s` and `yield_acceleration`.
+    upslope_yield_acceleration : float, array or DataArray, optional
+        Üy,up of a block that slides both ways, m/s²; by default, by statics, g tan(arctan(Üy/g) +
+        2θ), with no sliding upslope where that angle reaches 90°.  Beside `yield_coefficient` it or
+        `theta` must be given.
     decay_rate, delta_mu, minimum_friction : float, array or DataArray, optional
         λ, Δμ and μmin where they are known; each replaces its estimate (Eqs. 6, 9-11), which under
         a record every pulse has from its own peak.
@@ -132,7 +137,9 @@ def sweep(
     variables : sequence of str, optional
         Results to compute: `permanent_displacement`, `peak_relative_velocity`, `sliding_mode`,
         `validity` (these by default), `newmark_displacement` (of Newmark's block on the same cells,
-        with the same yield acceleration), the parameters of Eqs. 7-11, and `amplitude`.  Under a
+        with the same yield acceleration), the parameters of Eqs. 7-11, and `amplitude`.  With
+        ``Newmark(sliding="both")`` also `largest_displacement` and `smallest_displacement`, the
+        extremes of u over time (m; by default, too).  Under a
         record `sliding_mode` gives way to `number_of_slips` (that begin at rest),
         `stick_slip_pulses` and `continuous_pulses` (by Eq. 7 with each pulse's own peak: an
         extension of the paper's harmonic motion), the parameters and `amplitude` to
@@ -196,6 +203,7 @@ def sweep(
         azimuth=azimuth,
         yield_acceleration=yield_acceleration,
         yield_coefficient=yield_coefficient,
+        upslope_yield_acceleration=upslope_yield_acceleration,
         decay_rate=decay_rate,
         delta_mu=delta_mu,
         minimum_friction=minimum_friction,

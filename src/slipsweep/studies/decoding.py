@@ -61,7 +61,8 @@ def flags(data: xr.Dataset | xr.DataArray) -> xr.Dataset:
         )
     if mask.dtype.kind not in "iu":
         raise InputError(
-            f"{data.name}: {mask.dtype} values; must be whole numbers (mask_and_scale=False keeps them)"
+            f"{data.name}: {mask.dtype} values; must be whole numbers, of which none is missing "
+            "(mask_and_scale=False keeps them)"
         )
     # a flag of no kind, of another program's file, goes last
     order = {

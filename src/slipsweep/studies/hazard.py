@@ -9,7 +9,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeAlias
 from xml.etree import ElementTree as xml
 
 import numpy as np
@@ -18,8 +18,9 @@ import xarray as xr
 from slipsweep.errors import InputError, RunError
 from slipsweep.model.parameters import check_numbers, number_text, shown
 from slipsweep.model.units import conversion
-from slipsweep.model.variables import HAZARD_RESULTS
-from slipsweep.motion.formats import read_columns, read_lines
+from slipsweep.model.variables import HAZARD_RESULTS, PARAMETERS, PUBLISHED_RESULTS, STRENGTHS
+from slipsweep.motion.lines import read_columns, read_lines
+from slipsweep.studies.published_statistics import published_statistics
 from slipsweep.studies.sampling import Floats, Thresholds
 from slipsweep.studies.suite_statistics import (
     THRESHOLDS,
@@ -31,15 +32,38 @@ from slipsweep.studies.suite_statistics import (
 
 TITLE = "Mean annual rate of exceeding a permanent displacement"
 
-#: Words of a column's name that say what it holds.
-_PGA = {"pga", "acceleration", "amplitude"}
-_RATE = {"rate", "frequency", "exceedance", "afe"}
+Unstated: TypeAlias = Literal["refuse", "accept"]
+
+#: What a heading calls the measure of a curve: peak ground acceleration, another one, or a measure
+#: that may be either.
+_PGA = r"\bpga\b|\bpeak\b.*\bacc|\bzpa\b"
+_SPECTRAL = r"\bp?sa\b|\bsa\s?\(|spectral|response.spectr|\bpg[vd]\b"
+_OTHER_MEASURE = (
+    rf"{_SPECTRAL}|\bs[dv]\b|velocity|displacement|\bmmi\b|\barias\b|\bcav\b|\bia\b"
+    r"|(?<!return )period|\b\d+(?:\.\d+)?\s?(?:s|sec|hz)\b"
+)
+_MEASURE = r"accel|amplitude|ground.?motion|\bi(ml|mt|m)\b|intensity|\blevel"
+
+#: What it calls a rate, whether it says that it is one a year, and what is none.
+_RATE = r"\brate|\bfrequency|exceed|\bm?afe\b|\bmaf\b|\blambda\b|λ"
+_ANNUAL = r"annual|yearly|a year|per (?:year|yr|annum)|/\s?(?:year|yr|a)\b|\bm?afe\b|\bmaf\b"
+_NO_RATE = r"probab|\bpoe\b|\baep\b|\bpe\b|\b\d+(?:\.\d+)?[ -]?(?:years?|yrs?|a)\b|return|period"
 
 #: Spellings of the unit of an annual rate.
-_ANNUAL = {"", "1/yr", "1/year", "1/a", "/yr", "/year", "yr-1", "year-1", "a-1", "per year"}
+_PER_YEAR = {"1/yr", "1/year", "1/a", "/yr", "/year", "yr-1", "year-1", "a-1", "per year"}
+
+#: Accelerations over a hazard curve at which published equations are evaluated.
+PUBLISHED_POINTS = 401
+
+#: Probability of exceedance at the start of a hazard curve from which on what lies below it counts.
+_LITTLE = 0.01
 
 #: Columns of OpenQuake's files: the probability of exceeding an acceleration, in g.
-_POE = re.compile(r"poe-(\d.*)")
+_POE = re.compile(r"poe-(\d[\d.eE+-]*)(?::\w+)?")
+
+_ACCEPT = (
+    "--unstated accept takes it for a curve of PGA and annual rates (in Python give a HazardCurve)"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,14 +131,19 @@ class HazardCurve:
         )
 
 
-def read_hazard_curve(path: str | Path, g: float, site: int | None = None) -> HazardCurve:
+def read_hazard_curve(
+    path: str | Path, g: float, site: int | None = None, unstated: Unstated = "refuse"
+) -> HazardCurve:
     """Read a hazard curve of peak ground acceleration from a CSV file; "g" as a unit is `g` m/s², that of the result.
 
     The first line that is not blank and does not begin with ``#`` names the columns: ``PGA (g),
     annual rate``. Columns of other names are left out.  Or a file of OpenQuake, whose probabilities
     of exceedance become annual rates, −ln(1 − p)/T with its investigation time T; `site` is which
-    of its sites, from 1, and needed if it has several. InputError: the file cannot be read, a
-    column is missing or has no unit, or the numbers are no hazard curve.
+    of its sites, from 1, and needed if it has several.
+
+    A file that does not say that its curve is of PGA, or that its rates are annual, is refused, or
+    with `unstated` "accept" taken as such.  InputError: it says otherwise, cannot be read, a column
+    is missing or has no unit, or the numbers are no hazard curve.
     """
     try:
         path = Path(path)
@@ -126,22 +155,33 @@ def read_hazard_curve(path: str | Path, g: float, site: int | None = None) -> Ha
     about = {"hazard_curve_sha256": digest}
     named = next((line for line in lines if line.strip() and not line.startswith("#")), "")
     if _POE.search(named):
-        return _openquake_curve(path, lines, g, site, about)
+        return _openquake_curve(path, lines, g, site, unstated, about)
     if site is not None:
         raise InputError(f"{path}: site = {site}: only for a file of OpenQuake with several sites")
+    comments = _comments(path, lines)
+    has_pga = _says(_PGA, named)
 
     def holds(column: str, words: set[str], unit: str) -> tuple[str, float] | None:
         where = f"{path}: column {shown(column)}"
-        if "probability" in words:
+        if _says(_NO_RATE, column) and not _says(rf"{_PGA}|{_MEASURE}", column):
             raise InputError(
-                f"{where}: must be an annual rate, -ln(1 - p) of an annual probability p"
+                f"{where}: must be an annual rate, -ln(1 - p)/T of a probability p in T years"
             )
-        if words & _RATE:
-            if unit.lower() not in _ANNUAL:
+        if _says(_RATE, column):
+            if unit and unit.lower() not in _PER_YEAR:
                 raise InputError(f"{where}: must be a rate per year, such as annual rate (1/yr)")
+            if not unit and not _says(_ANNUAL, column) and unstated == "refuse":
+                raise InputError(f"{where}: does not say that its rates are annual; {_ACCEPT}")
             return "annual rate", 1.0
-        if not words & _PGA:
+        if _says(_OTHER_MEASURE, column):
+            if has_pga:
+                return None
+            raise InputError(f"{where}: must be of PGA")
+        is_pga = _says(_PGA, column)
+        if not is_pga and (has_pga or not _says(_MEASURE, column)):
             return None
+        if not is_pga and not _says(_PGA, comments) and unstated == "refuse":
+            raise InputError(f"{where}: does not say that it is PGA; {_ACCEPT}")
         if not unit:
             raise InputError(f"{where}: must give its unit in brackets, such as PGA (g)")
         return "PGA", conversion(f"{where}: unit", "m s-2", unit, g)
@@ -150,18 +190,45 @@ def read_hazard_curve(path: str | Path, g: float, site: int | None = None) -> Ha
     return HazardCurve(values["PGA"], values["annual rate"], str(path), about)
 
 
+def _says(pattern: str, text: str) -> bool:
+    """Whether a heading says something; underscores separate words as blanks do."""
+    return bool(re.search(pattern, text.replace("_", " "), re.IGNORECASE))
+
+
+def _comments(path: Path, lines: Sequence[str]) -> str:
+    """The comments of a table (InputError: one says that the curve is another one)."""
+    comments = [line for line in lines if line.startswith("#")]
+    for comment in comments:
+        is_other = _says(_SPECTRAL, comment) and not _says(_PGA, comment)
+        if is_other or (_says(r"exceed|probab", comment) and _says(_NO_RATE, comment)):
+            raise InputError(
+                f"{path}: its comment says {shown(comment.strip(' #'))}: "
+                "must be a curve of PGA and annual rates"
+            )
+    return "\n".join(comments)
+
+
 def _openquake_curve(
-    path: Path, lines: Sequence[str], g: float, site: int | None, about: Mapping[str, str]
+    path: Path,
+    lines: Sequence[str],
+    g: float,
+    site: int | None,
+    unstated: Unstated,
+    about: Mapping[str, str],
 ) -> HazardCurve:
     """One site's curve from a file of OpenQuake: a comment with T and the measure, names, and a row for each site."""
     head = " ".join(line for line in lines if line.startswith("#"))
-    found = re.search(r"investigation_time=([\d.eE+-]+)", head)
+    found = re.search(r"investigation_time\s*=[\s\"']*([\d.eE+-]+)", head)
     if found is None:
         raise InputError(
             f"{path}: no investigation_time in its first line: it is needed for annual rates"
         )
-    measure = re.search(r"imt='?([^',\"]+)", head)
-    if measure is not None and measure[1] != "PGA":
+    measure = re.search(r"\bimt\s*=[\s\"']*([^\s\"',]+)", head)
+    if measure is None and unstated == "refuse":
+        raise InputError(
+            f"{path}: no imt in its first line: does not say that it is PGA; {_ACCEPT}"
+        )
+    if measure is not None and measure[1].upper() != "PGA":
         raise InputError(f"{path}: curves of {measure[1]}: must be of PGA")
     names, *rows = csv.reader(line for line in lines if line.strip() and not line.startswith("#"))
     if not 1 <= (1 if site is None else site) <= len(rows) or (site is None and len(rows) > 1):
@@ -222,6 +289,37 @@ def fragility(
         "amplitude"
     )
     return found.transpose(..., "amplitude", "threshold")
+
+
+def published_fragility(
+    result: xr.Dataset,
+    curve: HazardCurve,
+    equations: str | Sequence[str],
+    thresholds: Thresholds | None = None,
+    magnitude: float | None = None,
+) -> xr.Dataset:
+    """Probability of exceeding displacements by published equations, as `fragility` of a suite.
+
+    The amplitudes are `PUBLISHED_POINTS` from one end of the hazard curve to the other: equations
+    need no motions, and of the result only the blocks.  `in_range` goes with it.
+    """
+    strengths = [*STRENGTHS, "displacement_amplitude"]
+    first = dict.fromkeys([name for name in strengths if name in result.dims], 0)
+    blocks = result.isel(first).drop_vars(strengths, errors="ignore")
+    amplitude = np.geomspace(curve.amplitude[0], curve.amplitude[-1], PUBLISHED_POINTS)
+    amplitude[[0, -1]] = curve.amplitude[[0, -1]]  # the ends without rounding
+    placed = blocks.assign_coords(amplitude=("amplitude", amplitude, PARAMETERS["amplitude"]))
+    found = published_statistics(
+        placed,
+        equations,
+        magnitude=magnitude,
+        thresholds=THRESHOLDS if thresholds is None else thresholds,
+        quantiles=0.5,
+    )
+    missing = found["exceedance_probability"].isel(threshold=0, drop=True).isnull()
+    found["valueless_share"] = missing.astype(np.float64)
+    wanted = ["exceedance_probability", "valueless_share", "in_range"]
+    return found[wanted].transpose(..., "amplitude", "threshold")
 
 
 def openquake_fragility(found: xr.Dataset) -> str:
@@ -318,6 +416,8 @@ def displacement_hazard(
     thresholds: Thresholds | None = None,
     *,
     over: str | Sequence[str] | None = None,
+    equations: str | Sequence[str] | None = None,
+    magnitude: float | None = None,
 ) -> xr.Dataset:
     """Mean annual rates of exceeding displacements (Cornell [1]_), from a hazard curve and a fragility.
 
@@ -338,11 +438,16 @@ def displacement_hazard(
         default all.
     over : str or list of str, optional
         As in `suite_statistics`.
+    equations : str or list of str, optional
+        Names of published equations that take the place of the suite, as in `published_statistics`:
+        `result` then only has the blocks, and P is evaluated over the whole curve.
+    magnitude : float, optional
+        Moment magnitude M, for the equations that need it.
 
     Returns
     -------
     Dataset
-        Over all other dimensions and `threshold` (m), per year:
+        Over all other dimensions, `equation` if there are some, and `threshold` (m), per year:
 
         - `annual_rate`: NaN where fewer than two amplitudes have a value.
         - `held_rate`: the part of it from above the largest amplitude, or the end of the curve: P is held there.
@@ -351,6 +456,7 @@ def displacement_hazard(
         - `lower_rate`, `upper_rate`: the rate if P between two amplitudes is the lower, or the higher, of the two.  Far
           from each other, more amplitudes are needed.
         - `valueless_share`: the largest share of motions or samples without a value at any amplitude.
+        - `outside_rate`, of equations: the part of the rate that is outside of their range.
 
     Raises
     ------
@@ -385,10 +491,16 @@ def displacement_hazard(
         raise InputError(f"result = {shown(result)}: must be a Dataset")
     if not isinstance(curve, HazardCurve):
         curve = read_hazard_curve(curve, float(result.attrs.get("g", np.nan)))
-    found = fragility(result, thresholds, over)
+    if equations is None and magnitude is not None:
+        raise InputError(f"magnitude = {shown(magnitude)}: only with equations")
+    if equations is None:
+        found = fragility(result, thresholds, over)
+    else:
+        found = published_fragility(result, curve, equations, thresholds, magnitude)
     amplitude = found["amplitude"].values.astype(np.float64)
     chances = found["exceedance_probability"].variable
-    results = {name: xr.full_like(chances.sum("amplitude"), np.nan) for name in HAZARD_RESULTS}
+    names = [*HAZARD_RESULTS, *([] if equations is None else ["outside_rate"])]
+    results = {name: xr.full_like(chances.sum("amplitude"), np.nan) for name in names}
     results["valueless_share"] = found["valueless_share"].max("amplitude").variable
     for point in np.ndindex(chances.shape[:-2]):
         there = np.isfinite(chances.values[*point, :, 0])
@@ -398,16 +510,22 @@ def displacement_hazard(
                 "result: amplitude: only two peak ground accelerations have a value, and P(u > d) differs between "
                 "them; how it grows in between is not known: run the sweep with more values on the axis amplitude"
             )
-        for name, values in (
-            exceedance_rates(curve, amplitude[there], own).items() if len(own) > 1 else ()
-        ):
+        rates = exceedance_rates(curve, amplitude[there], own) if len(own) > 1 else {}
+        if rates and equations is not None:
+            outside = np.where(found["in_range"].values[*point, there, None], 0.0, own)
+            parts = exceedance_rates(curve, amplitude[there], outside)
+            rates["outside_rate"] = parts["annual_rate"]
+            # the least probability by a lognormal distribution is above 0
+            rates["omitted_rate"] = np.where(own[0] > _LITTLE, np.nan, 0.0)
+        for name, values in rates.items():
             results[name][point] = values
     if results["annual_rate"].isnull().all():
-        raise RunError(
-            "no annual rate: the model gives no value under any motion at two amplitudes or more"
-        )
+        why = "the model gives no value under any motion at two amplitudes or more"
+        if equations is not None:
+            why = "each block slides under its own weight"
+        raise RunError(f"no annual rate: {why}")
     for name, one in results.items():
-        one.attrs = HAZARD_RESULTS[name]
+        one.attrs = (HAZARD_RESULTS | PUBLISHED_RESULTS)[name]
     coords = {
         name: one.variable
         for name, one in found.coords.items()

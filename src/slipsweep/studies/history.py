@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError
 from slipsweep.grid import engine, plans, resources, solvers
 from slipsweep.grid import inputs as grid_inputs
-from slipsweep.kernels import exact
 from slipsweep.kernels import history as kernels
-from slipsweep.kernels.block import Cell
+from slipsweep.kernels import step
+from slipsweep.kernels.block import Cell, Motion
 from slipsweep.model import options, parameters, variables
 from slipsweep.model.variables import HISTORY
 from slipsweep.motion import cutting
+from slipsweep.motion.paths import values_at
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import Waveform
@@ -37,6 +38,7 @@ def simulate(
     phi: float | None = None,
     excitation: datasets.Excitation = "sine",
     model: options.Model | str = "mendez",
+    solver: options.Solver | str = "auto",
     times: Sequence[float] | np.ndarray | None = None,
     points_per_cycle: int | None = None,
     displacement_amplitude: float | None = None,
@@ -52,7 +54,7 @@ def simulate(
     minimum_friction: float | None = None,
     structure_frequency: float | None = None,
 ) -> xr.Dataset:
-    """Time history of one block, event by event: the samples carry rounding errors only.
+    """Time history of one block: event by event, so that the samples are exact, or by steps.
 
     Parameters
     ----------
@@ -117,7 +119,8 @@ def simulate(
         minimum_friction=minimum_friction,
         structure_frequency=structure_frequency,
     )
-    problem = grid_inputs.check_problem(excitation, model, "cycle")
+    problem = grid_inputs.check_problem(excitation, model, solver)
+    options.check_one_way("simulate", getattr(problem.model, "sliding", None))
     motion = problem.excitation
     if isinstance(motion, Suite):
         one_motion = f"suite[{motion.labels[0]!r}]{'.rotated(azimuth)' if motion.has_pairs else ''}"
@@ -126,7 +129,7 @@ def simulate(
         raise InputError(
             "points_per_cycle: not allowed with a Record, whose samples are the points; give times"
         )
-    plan = plans.plan_sweep(inputs, excitation=motion, model=problem.model)
+    plan = plans.plan_sweep(inputs, excitation=motion, model=problem.model, solver=problem.solver)
     for name, variable in plan.coords.items():
         if variable.dims:
             raise InputError(f"{name}: simulate takes one case; must be a single number")
@@ -167,9 +170,9 @@ class _History:
         self.options = solvers.options_of(problem, wants_peak=True)
         self.record = motion if isinstance(motion, Record) else None
         if self.record is not None:
-            self.wave = cutting.wave_of_record(self.record, float(inputs["polarity"]))
+            self.path = cutting.path_of_record(self.record, float(inputs["polarity"]))
         else:
-            self.wave = cutting.wave_of(motion)
+            self.path = cutting.path_of_waveform(motion)
         #: Seconds that a phase takes: 1/ω, or the factor on the time of a record.
         self.unit = float(engine.phase_seconds(problem, inputs))
         self.valueless = bool(int(summary["validity"]) & variables.VALUELESS)
@@ -177,14 +180,39 @@ class _History:
     def sampled(self, phases: Floats) -> Floats:
         """The rows of `HISTORY` at phases, velocity and displacement in units of phase."""
         table = np.empty((len(HISTORY), phases.size))
-        workspace = exact.workspace_of(self.wave, keeps_log=True)
-        fill = kernels.fill_history if self.record is None else kernels.fill_recorded_history
-        _interruptible(
-            fill, self.cell, self.options, self.wave, workspace, phases, kernels.History(*table)
-        )
+        if isinstance(self.problem.solver, options.Step):
+            self._step(phases, table)
+        else:
+            self._walk(phases, table)
         if self.valueless:  # from the beginning on, also where the flag is raised later
             table[1:] = math.nan
         return table
+
+    def _step(self, phases: Floats, table: Floats) -> None:
+        """Fill in a history by steps."""
+        polarity = 1.0 if self.record is None else float(self.inputs["polarity"])
+        stepper = solvers.stepper_of(self.problem, self.options, polarity)
+        cells = np.full((1, len(step.STEP_CELL.names or ())), math.nan).view(step.STEP_CELL)[:, 0]
+        for name, value in zip(Cell._fields, self.cell, strict=True):
+            cells[name] = value
+        table[0] = self.cell.amplitude * values_at(self.path, phases)
+        history = step.history_of(phases, table[0])
+        _interruptible(stepper, cells, history, np.empty((len(Motion._fields), 1)))
+        table[1] = history.block_acceleration
+        table[2] = history.friction_coefficient
+        table[3] = history.velocity
+        table[4] = history.displacement
+
+    def _walk(self, phases: Floats, table: Floats) -> None:
+        """Fill in a history from event to event."""
+        _interruptible(
+            kernels.fill_history,
+            self.cell,
+            self.options,
+            self.path,
+            phases,
+            kernels.History(*table),
+        )
 
     def columns(self, phases: Floats) -> dict[str, xr.Variable]:
         """The variables of a history."""
@@ -212,16 +240,17 @@ class _History:
         if self.record is None:
             return {}
         with np.errstate(over="ignore"):
-            peak = self.wave.height * self.cell.amplitude
+            peak = self.path.intervals["height"] * self.cell.amplitude
         given = {**self.inputs, "amplitude": xr.Variable("half_wave", peak)}
         request = engine.Request(self.problem, {"half_wave": peak.size}, given, ("sliding_mode",))
         mode = engine.friction_parameters(request)["sliding_mode"].values
         if self.valueless:
             mode[:] = variables.SlidingMode.MISSING
-        first, after = self.wave.interval.T
+        first = self.path.intervals["first"]
+        after = self.path.intervals["end"]
         found = {
-            "half_wave_start": self.unit * self.wave.pieces["start"][first],
-            "half_wave_end": self.unit * self.wave.pieces["end"][after - 1],
+            "half_wave_start": self.unit * self.path.base.pieces["start"][first],
+            "half_wave_end": self.unit * self.path.base.pieces["end"][after - 1],
             "half_wave_peak": peak,
             "half_wave_mode": mode,
         }

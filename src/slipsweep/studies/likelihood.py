@@ -20,11 +20,10 @@ from slipsweep.errors import InputError
 from slipsweep.grid.inputs import Problem
 from slipsweep.grid.solvers import options_of
 from slipsweep.kernels.block import Cell
-from slipsweep.kernels.exact import workspace_of
-from slipsweep.kernels.history import History, fill_recorded_history
+from slipsweep.kernels.history import History, fill_history
 from slipsweep.model.options import Cycle, Mendez
 from slipsweep.model.variables import HISTORY
-from slipsweep.motion.cutting import wave_of_record
+from slipsweep.motion.cutting import path_of_record
 from slipsweep.motion.records import Record
 from slipsweep.motion.shaking import RESPONSES, TABLE, ShakingTest, check_channels
 from slipsweep.studies.friction import Floats, check_contact, noise_of
@@ -205,15 +204,17 @@ class Observation:
         return Record(self.motion.times, self.table_acceleration(sizes))
 
     def _forward(self, wrong: Floats | None = None) -> Forward:
-        """Return the model's block on the table's motion with so many standard deviations of each of its errors."""
+        """Return the model's block on the table's motion.
+
+        `wrong` are the standard deviations of each error of that motion.
+        """
         motion = self.motion.with_errors(self.wrong if wrong is None else wrong)
 
         @functools.lru_cache(maxsize=4)
-        def solver_of(sizes: tuple[float, ...]) -> tuple[Any, Any, Any]:
+        def shaking_of(sizes: tuple[float, ...]) -> tuple[Any, Any]:
             record = Record(self.motion.times, motion - self._table_lines @ np.array(sizes))
             options = options_of(Problem(self.model, record, Cycle()), wants_peak=True)
-            wave = wave_of_record.__wrapped__(record, 1.0)  # kept here, not in its cache
-            return options, wave, workspace_of(wave, keeps_log=True)
+            return options, path_of_record.__wrapped__(record, 1.0)  # kept here, not in its cache
 
         def histories(parameters: Floats, times: Floats) -> dict[str, Floats]:
             onset, decay, drop, *sizes = map(float, parameters)
@@ -221,7 +222,7 @@ class Observation:
                 math.tan(math.radians(self.theta)), self.mu_s, 1.0, onset, decay, drop, math.nan
             )
             table = np.empty((len(HISTORY), times.size))
-            fill_recorded_history(cell, *solver_of(tuple(sizes)), times, History(*table))
+            fill_history(cell, *shaking_of(tuple(sizes)), times, History(*table))
             return dict(zip(HISTORY, table, strict=True))
 
         return histories
@@ -229,10 +230,11 @@ class Observation:
     def _scaled(self, series: Mapping[str, Floats]) -> Floats:
         """Return the samples that count, channel by channel, in standard deviations; 0 of a channel that is not there."""
         none = np.zeros(self.test.times.size)
-        return (
+        weighted: Floats = (
             np.array([series.get(name, none) for name in self.channels])[self._counted]
             * self._scale
         )
+        return weighted
 
     def _by_channel(self, values: Floats) -> list[Floats]:
         return np.split(values, np.cumsum(self._counted.sum(axis=1))[:-1])

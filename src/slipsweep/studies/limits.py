@@ -202,6 +202,7 @@ def plan_limits(
     plan = plan_sweep(
         swapped, excitation=excitation, model=model, variables=["permanent_displacement"]
     )
+    options.check_one_way("limit_amplitude", plan.attrs.get("sliding"))
     ((_, request),) = plan.tasks
     if maximum_amplitude is None:
         maximum_amplitude = variables.MAXIMUM_AMPLITUDE_IN_G * request.problem.model.g

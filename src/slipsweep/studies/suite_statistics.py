@@ -10,6 +10,7 @@ import xarray as xr
 
 from slipsweep.errors import InputError
 from slipsweep.grid.resources import grid_text
+from slipsweep.model.options import check_one_way
 from slipsweep.model.parameters import check_list, number_text, shown
 from slipsweep.model.variables import (
     STATISTIC_COORDINATES,
@@ -105,6 +106,7 @@ def suite_statistics(
     for name in ("permanent_displacement", "validity"):
         if name not in result.data_vars:
             raise InputError(f"result: {name}: missing: must be there, of all motions")
+    check_one_way("suite_statistics", result.attrs.get("sliding"))
     dims = suite_dims(result["permanent_displacement"], over)
     g = float(result.attrs.get("g", np.nan))
     limits = check_thresholds("thresholds", thresholds, g)

@@ -223,6 +223,7 @@ def plan_samples(
 ) -> "SamplePlan":
     """Plan of the samples of a grid, drawn and checked; errors as of `slipsweep.sample`."""
     problem = grid_inputs.check_problem(excitation, model, solver)
+    options.check_one_way("sample", getattr(problem.model, "sliding", None))
     _check_drawn(sampling, tuple(inputs.given), problem)
     drawn = sampling.distributions
     absolute = [name for name, one in drawn.items() if one.kind == "absolute"]

@@ -1,0 +1,163 @@
+"""Headings of records: the quantity and the unit that they name, vertical components."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from slipsweep.errors import InputError
+from slipsweep.motion.reading import UNITS
+
+#: Spellings of the units that are read, as `_plain` leaves them.
+_SPELLINGS = {name: name for name in UNITS} | {
+    "gs": "g",
+    "gals": "gal",
+    "cms2": "cm/s2",
+    "ms2": "m/s2",
+}
+
+_LENGTHS = r"(?:[kdcmun]?m|in|inch|inches|ft|foot|feet)"
+
+#: Other units that a heading may name, as `_plain` leaves them.
+_OTHER_UNITS = {
+    "acceleration": rf"{_LENGTHS}/?s2|(?:m|milli|u|micro)-?(?:g|gals?)|%-?g|g/\d+"
+    r"|[\d.]+(?:e?-?\d+)?x?(?:g|gals?|c?m/s2)|counts?|cts|volts?|mv",
+    "velocity": rf"{_LENGTHS}/s|kines?",
+    "displacement": rf"{_LENGTHS}|met(?:er|re)s?|centimet(?:er|re)s?|millimet(?:er|re)s?",
+}
+
+#: Words for quantities, in the languages that records are described in.
+_ACCELERATION = r"acc(?:[^a-z]|el|$)|acel|accé|beschl"
+_SPECTRAL = r"spectral[ -](?:acc|vel|disp)\w*|response[ -]spectr\w*"
+_OTHER_QUANTITIES = (
+    r"(?<![a-z])(?:vel(?:o[ck]\w*)?|pgv|vitesse|geschwindigkeit"
+    rf"|dis(?:pl?\w*)?|pgd|desplaz\w*|d[ée]placement|verschiebung|jerk|{_SPECTRAL})(?![a-z])"
+    r"|^p?sa\b"
+)
+
+#: What headings say of a motion or its site beside its samples.
+_ASIDES = (
+    r"(?:peak|max\w*\.?|initial|final|shear|wave|site)[\s_-]+(?:ground[\s_-]+|wave[\s_-]+)?"
+    r"(?:vel|disp)\w*"
+)
+
+#: Marks of a vertical component: words of what a file says of it, and parts of a file's name.
+_VERTICAL = {"UP", "U", "UD", "DU", "DN", "DWN", "DOWN", "V", "VER", "VRT", "VERT", "VERTICAL", "Z"}
+_VERTICAL |= {"UD1", "UD2", "ACCZ", "AZ"}
+_VERTICAL_CHANNEL = r"[B-FHLMSV][NGLH]Z"
+_BEHIND_A_DIGIT = r"\d(UD\d?|UP|DN|DWN|VER|VERT)$"
+
+
+class _Unit(NamedTuple):
+    """A unit that a heading names."""
+
+    text: str  # as it stands there
+    quantity: str
+    unit: str | None  # None: one that is not read
+
+
+def unit_said(header: str, column: str = "") -> str | None:
+    """Return the unit that the heading of a column names, or else the whole header; None if none.
+
+    InputError: it names another quantity than an acceleration, or a unit that is not read.
+    """
+    found = _first(_in_name(column)) or _first(_in_units_line(header)) or _first(_in_text(header))
+    words = re.search(_OTHER_QUANTITIES, column, re.IGNORECASE)
+    words = words or re.search(_SPECTRAL, header, re.IGNORECASE)
+    if words is None and not (found and found.quantity == "acceleration"):
+        text = re.sub(_ASIDES, "", header, flags=re.IGNORECASE)
+        if not re.search(_ACCELERATION, f"{header}\n{column}", re.IGNORECASE):
+            words = re.search(_OTHER_QUANTITIES, text, re.IGNORECASE)
+    if words is None and (found is None or found.unit is not None):
+        return found.unit if found else None
+    said = " in ".join(
+        dict.fromkeys(part for part in (words and words[0], found and found.text) if part)
+    )
+    raise InputError(
+        f"its heading says {said!r}: must be an acceleration in one of {', '.join(UNITS)}"
+    )
+
+
+def vertical_mark(component: str, path: Path | None = None) -> str | None:
+    """Return what in a component's text, or in the name of its file, says that it is vertical."""
+    words = re.split(r"[^A-Z0-9]+", re.sub(r"\bU[-/]D\b", "UD", component.upper()))
+    found = [one for one in words if one in _VERTICAL or re.fullmatch(_VERTICAL_CHANNEL, one)]
+    if found or path is None:
+        return found[0] if found else None
+    name = re.sub(r"\bU-D\b|(?<=_)U-D\b", "UD", path.name)
+    parts = [part for part in re.split(r"[._\-\s]+", name) if part]
+    ends = [part.upper() for part in (*parts[-1:], *parts[-2:-1])]
+    is_end = (end for end in ends if end in _VERTICAL - {"U"})
+    joined = re.search(_BEHIND_A_DIGIT, path.stem, re.IGNORECASE)
+    is_channel = (part for part in (*ends, *parts) if re.fullmatch(_VERTICAL_CHANNEL, part))
+    return next(is_end, None) or (joined[1] if joined else next(is_channel, None))
+
+
+def is_unit(text: str) -> bool:
+    """Whether a cell of a heading is a unit and nothing else, of a time or of a motion."""
+    bare = text.strip("()[] ")
+    return _plain(bare) in ("s", "ms", "min") or _first(iter([(bare, True)])) is not None
+
+
+def _first(candidates: Iterator[tuple[str, bool]]) -> _Unit | None:
+    """The first unit among texts, of an acceleration if there is one.
+
+    A unit of length is one only where the text stands for a unit anyhow.
+    """
+    found = []
+    for text, may_be_length in candidates:
+        plain = _plain(text)
+        if plain in _SPELLINGS:
+            found.append(_Unit(text.strip(), "acceleration", _SPELLINGS[plain]))
+        for quantity, pattern in _OTHER_UNITS.items():
+            if re.fullmatch(pattern, plain) and (may_be_length or quantity != "displacement"):
+                found.append(_Unit(text.strip(), quantity, None))
+    return min(found, key=lambda unit: unit.quantity != "acceleration", default=None)
+
+
+def _plain(text: str) -> str:
+    """A unit as it is compared: cm/sec/sec, CM/S**2, cm s^-2 and cm/s² are all cm/s2."""
+    plain = re.sub(r"[\s^*·'\"]", "", text.lower()).translate(str.maketrans("²−µμ", "2-uu"))
+    plain = re.sub(r"se[cg](?:onds?|undos?)?", "s", plain)
+    plain = re.sub(r"s-([12])", r"/s\1", plain).replace("//", "/").replace("/s1", "/s")
+    return re.sub(r"/s/s|/\(s2\)|/ss", "/s2", plain)
+
+
+def _brackets(text: str) -> list[str]:
+    return re.findall(r"[(\[]\s*([^()\[\]]+?)\s*[)\]]", text)[::-1]
+
+
+def _in_name(name: str) -> Iterator[tuple[str, bool]]:
+    """Texts of a column's name that may be its unit: in brackets, all of it, or its last words."""
+    yield from ((text, True) for text in _brackets(name))
+    yield name, False
+    words = re.split(r"[\s,:;=_]+", re.sub(r"[(\[].*?[)\]]", " ", name).strip())
+    yield " ".join(words[-2:]), False  # m s-2
+    yield from ((word, False) for word in words[:0:-1])
+
+
+def _in_units_line(header: str) -> Iterator[tuple[str, bool]]:
+    """Texts behind the word "units" in a header."""
+    for line in header.splitlines():
+        if found := re.search(r"(?i)(?:units?|unidad(?:es)?|einheit(?:en)?)\b(.*)", line):
+            words = re.split(r"[\s,:;=]+", found[1])
+            bare = [re.sub(r"\(.*", "", word).rstrip(".") for word in words]
+            texts = (*(word for word in bare if word.lower() != "in"), *_brackets(found[1]))
+            yield from ((text, True) for text in texts if text)
+
+
+def _in_text(header: str) -> Iterator[tuple[str, bool]]:
+    """Texts of a header's lines, the last first, that may be a unit."""
+    for line in header.splitlines()[::-1]:
+        yield from ((text, False) for text in _brackets(line))
+        words = re.findall(r"(?i)\bin\s+(\S+)", line)
+        yield from ((word.rstrip(".,;:"), False) for word in words)
+        if not is_sentence(line):
+            yield line.strip(" \t#%"), False
+            if re.search(_ACCELERATION, line, re.IGNORECASE):
+                yield from ((text, False) for text, _ in _in_name(line))
+
+
+def is_sentence(line: str) -> bool:
+    """Whether a line of a header gives a value, or a date, and so is no name of a column."""
+    return bool(re.search(r"[=:]|(?<![\w^*/-])\d", line))

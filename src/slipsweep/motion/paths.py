@@ -1,0 +1,148 @@
+"""The path of the base that the exact walk of the law goes through: one form for waves and records.
+
+Kernels are compiled for the types of their arguments.  The pieces of a wave (`motion.pieces`) have
+coefficients of 22 powers, those of a record of one: two types.  In a path the pieces of both are of
+one type, and the coefficients of the curved ones stand apart.
+"""
+
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slipsweep.motion.pieces import Wave
+
+#: Terms of the Taylor series of a smooth piece about its anchor: the first one beyond is 1.3e-18
+#: (docs/numerics.md#pieces-of-a-wave).
+TERMS = 22
+
+#: A piece of a path, and the coefficients of a curved one: records of the dtypes below.
+Piece: TypeAlias = Any
+Curve: TypeAlias = Any
+
+PIECE = np.dtype(
+    (
+        np.record,
+        np.dtype(
+            [
+                # phases of the motion, and the same as τ: one of `begin` and `finish` is 0
+                ("start", np.float64),
+                ("end", np.float64),
+                ("begin", np.float64),
+                ("finish", np.float64),
+                # w at the beginning, the end and the anchor, and dw/dτ there
+                ("first", np.float64),
+                ("last", np.float64),
+                ("top", np.float64),
+                ("slope", np.float64),
+                # 0: a plateau, 1: a straight line
+                ("degree", np.int64),
+                # its number, and that of its curve
+                ("number", np.int64),
+                ("curve", np.int64),
+                # w jumps up at its beginning; it is a quarter of a sine about its peak
+                ("jumps", np.bool_),
+                ("arc", np.bool_),
+            ],
+            align=True,
+        ),
+    )
+)
+
+CURVE = np.dtype(
+    (
+        np.record,
+        [
+            ("coefficients", np.float64, (TERMS,)),
+            # of the first and second integral from the anchor, of τ² and τ³ on
+            ("once", np.float64, (TERMS,)),
+            ("twice", np.float64, (TERMS,)),
+        ],
+    )
+)
+
+#: A cycle: its first piece, and a number that it shares with cycles of the same pieces.
+CYCLE = np.dtype((np.record, [("first", np.int64), ("shape", np.int64)]))
+
+#: A run of pieces with w > 0: the first of them, the first after them, and the largest w.
+INTERVAL = np.dtype((np.record, [("first", np.int64), ("end", np.int64), ("height", np.float64)]))
+
+
+class Base(NamedTuple):
+    """The motion of the base in the order of time."""
+
+    pieces: np.ndarray  # of PIECE
+    curves: np.ndarray  # of CURVE; one at least
+
+
+class Path(NamedTuple):
+    """The motion of the base, and what else the walk asks of it.
+
+    As in `motion.pieces.Wave` one plain cycle stands for those alike.
+    """
+
+    base: Base
+    intervals: np.ndarray  # of INTERVAL
+    cycles: np.ndarray  # of CYCLE; the last one begins where the path ends
+    highest: float  # w
+    lowest: float
+    lead: int
+    repeats: int
+    recorded: bool  # time stands in place of the phase, and each pulse has its own friction
+
+
+def path_of(wave: Wave, recorded: bool) -> Path:
+    """Return the path of a wave."""
+    pieces = np.zeros(wave.pieces.size, PIECE)
+    for name in ("start", "end", "begin", "finish", "first", "last", "top", "degree"):
+        pieces[name] = wave.pieces[name]
+    pieces["jumps"] = wave.pieces["jumps"]
+    pieces["arc"] = wave.pieces["arc"]
+    pieces["slope"] = wave.pieces["coefficients"][:, 0]
+    pieces["number"] = np.arange(pieces.size)
+    curved = np.flatnonzero(pieces["degree"] > 1)
+    pieces["curve"][curved] = np.arange(curved.size)
+    curves = np.zeros(max(curved.size, 1), CURVE)
+    for name in ("coefficients", "once", "twice") if curved.size else ():
+        curves[name] = wave.pieces[name][curved]
+    intervals = np.zeros(wave.height.size, INTERVAL)
+    intervals["first"] = wave.interval[:, 0]
+    intervals["end"] = wave.interval[:, 1]
+    intervals["height"] = wave.height
+    cycles = np.zeros(wave.cycle.size, CYCLE)
+    cycles["first"] = wave.cycle
+    cycles["shape"][:-1] = wave.shape
+    return Path(
+        base=Base(pieces, curves),
+        intervals=intervals,
+        cycles=cycles,
+        highest=wave.highest,
+        lowest=wave.lowest,
+        lead=wave.lead,
+        repeats=wave.repeats,
+        recorded=recorded,
+    )
+
+
+def values_at(path: Path, phases: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return w at phases of the shaking, or at times of a record; at a jump the value after it."""
+    pieces = path.base.pieces
+    repeated = max(path.repeats - 1, 0)
+    cycle = np.zeros(phases.size, np.int64)  # of the shaking; `row` is that of the path
+    row = cycle
+    if not path.recorded:
+        cycles = path.cycles.size - 1 + repeated
+        cycle = np.clip(np.floor(phases / (2.0 * np.pi)).astype(np.int64), 0, cycles - 1)
+        row = np.where(cycle < path.lead, cycle, np.maximum(cycle - repeated, path.lead))
+    inside = phases - 2.0 * np.pi * (cycle - row)
+    p = np.searchsorted(pieces["start"], inside, side="right") - 1
+    p = np.clip(p, path.cycles["first"][row], path.cycles["first"][row + 1] - 1)
+    begin = pieces["begin"][p]
+    tau = np.clip(begin + (inside - pieces["start"][p]), begin, pieces["finish"][p])
+    offset = pieces["slope"][p] * tau
+    curved = pieces["degree"][p] > 1
+    offset[curved] = 0.0
+    for coefficient in path.base.curves["coefficients"][pieces["curve"][p][curved]].T[::-1]:
+        offset[curved] = (offset[curved] + coefficient) * tau[curved]
+    shaken = (pieces["start"][0] <= inside) & (inside < pieces["end"][-1])
+    return np.where(shaken, pieces["top"][p] + offset, 0.0)

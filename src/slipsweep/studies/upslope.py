@@ -1,0 +1,121 @@
+"""Where a block that slides both ways would also slide upslope, which neither model lets it do.
+
+Both models let a block slide downslope only, but for continuous sliding by the paper's law.  On a
+level or gentle base a block also slides back, and ends near where it began.
+"""
+
+import inspect
+import math
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from slipsweep.model import equations
+from slipsweep.model.options import Mendez
+from slipsweep.motion.cutting import wave_of
+from slipsweep.motion.intensity import strength_factor
+from slipsweep.motion.records import Record
+from slipsweep.motion.suites import Pair, Suite
+from slipsweep.motion.waveforms import WAVEFORMS, peak_acceleration
+
+#: Equations as they are written: compiled ones take single numbers, and a second to compile.
+_coulomb: Any = inspect.unwrap(equations.coulomb_yield_acceleration)
+_limit_denominator: Any = inspect.unwrap(equations.limit_denominator)
+
+
+def upslope_yield_acceleration(
+    yield_acceleration: xr.DataArray, theta: xr.DataArray, g: float
+) -> xr.DataArray:
+    """Acceleration of the base beyond which a block slides upslope, m/s², from that for downslope.
+
+    By statics g tan(arctan(Üy/g) + 2θ), which is g tan(φs + θ) with Coulomb's Üy; `theta` is in
+    degrees.  Infinite where the angle reaches 90°.
+    """
+    angle = xr.apply_ufunc(np.arctan, yield_acceleration / g) + np.radians(2.0) * theta
+    onset: xr.DataArray = g * xr.apply_ufunc(np.tan, angle)
+    return onset.where(angle < 0.5 * math.pi, math.inf)
+
+
+def sliding_ways(
+    data: xr.Dataset, motion: Record | Suite | None = None
+) -> tuple[xr.DataArray, xr.DataArray] | None:
+    """Find where a block slides, and where one that slides both ways would also slide upslope.
+
+    Parameters
+    ----------
+    data : Dataset
+        A result, a slice of one, or a time history; of results the coordinates are enough.
+    motion : Record or Suite, optional
+        The recorded motion of the result.
+
+    Returns
+    -------
+    (DataArray, DataArray) or None
+        True where the base's acceleration exceeds Üy, and where it exceeds the upslope yield
+        acceleration, but not in continuous sliding by the paper's law under a waveform, which goes
+        both ways already.  None where that is not known: of a result without θ, or without its
+        motion; and where the result is of a block that slides both ways.
+    """
+    if "theta" not in data.coords or data.attrs.get("sliding") == "both":
+        return None
+    peaks = _peaks(data, motion)
+    if peaks is None:
+        return None
+    g = float(data.attrs["g"])
+    theta = _values(data, "theta")
+    tan_theta = xr.apply_ufunc(np.tan, np.radians(1.0) * theta)
+    if "yield_acceleration" in data.coords:
+        onset = _values(data, "yield_acceleration")
+    else:
+        onset = _coulomb(_values(data, "mu_s"), tan_theta, g)
+    onset = onset.where(onset > 0.0)
+    slides = peaks[0] > onset
+    slides_back = peaks[1] > upslope_yield_acceleration(onset, theta, g)
+    if WAVEFORMS.attribute in data.attrs and data.attrs["model"] == Mendez.name:
+        mu_s = _values(data, "mu_s")
+        in_contact = _amplitude(data) * tan_theta < g
+        limit = (onset + g * mu_s) / _limit_denominator(mu_s, tan_theta)  # Eq. 7
+        slides = slides & in_contact
+        slides_back = slides_back & in_contact & ~(_amplitude(data) > limit)
+    return slides, slides_back
+
+
+def _values(data: xr.Dataset, name: str) -> xr.DataArray:
+    """A parameter without its coordinates, which would have to agree with those of others."""
+    return data[name].astype(np.float64).reset_coords(drop=True)
+
+
+def _amplitude(data: xr.Dataset) -> Any:
+    """Peak ground acceleration under a waveform, m/s²."""
+    if "amplitude" in data.variables:
+        return _values(data, "amplitude")
+    return peak_acceleration(_values(data, "displacement_amplitude"), _values(data, "frequency"))
+
+
+def _peaks(data: xr.Dataset, motion: Record | Suite | None) -> tuple[Any, Any] | None:
+    """Largest accelerations of the base that drive the block downslope and upslope, m/s²; None: not known."""
+    if WAVEFORMS.attribute in data.attrs:
+        wave = wave_of(WAVEFORMS.from_attributes(data.attrs))
+        amplitude = _amplitude(data)
+        return amplitude * wave.highest, amplitude * -wave.lowest
+    if "ground_acceleration" in data:
+        return data["ground_acceleration"].max(), -data["ground_acceleration"].min()
+    return None if motion is None else _recorded_peaks(data, motion)
+
+
+def _recorded_peaks(data: xr.Dataset, motion: Record | Suite) -> tuple[Any, Any]:
+    """Those of a record, or of the motions of a suite one by one."""
+    for name in ("motion", "azimuth"):
+        if name in data.coords and data[name].ndim:
+            (dim,) = data[name].dims
+            cuts = [data.isel({dim: at}) for at in range(data.sizes[dim])]
+            down, up = zip(*(_recorded_peaks(cut, motion) for cut in cuts), strict=True)
+            return xr.concat(down, dim), xr.concat(up, dim)
+    if isinstance(motion, Suite):
+        record = motion[str(data["motion"].item())]
+        motion = record.rotated(data["azimuth"].item()) if isinstance(record, Pair) else record
+    coords = {str(name): one.reset_coords(drop=True) for name, one in data.coords.items()}
+    factor = strength_factor(motion.times, motion.acceleration, coords) * coords["polarity"]
+    ends = [factor * end for end in (motion.acceleration.min(), motion.acceleration.max())]
+    return np.maximum(*ends), -np.minimum(*ends)
