@@ -35,6 +35,7 @@ SLIDING: dict[str, Any] = {
     "excitation": slipsweep.Sine(cycles=3),
 }
 
+
 def histories(case: dict[str, Any], rate: float) -> xr.Dataset:
     times = np.arange(0.0, case["excitation"].cycles / case["frequency"], 1.0 / rate)
     return slipsweep.simulate(**case, times=times)
@@ -106,7 +107,9 @@ def test_intervals_reach_as_far_as_95_percent_of_a_normal_distribution(
 ) -> None:
     errors = np.sqrt(np.diag(covariance_of(sliding)))
     for name, error in zip(SOUGHT[1:], errors, strict=True):
-        below, above = calibrated_sliding[f"{name}_interval"].values - calibrated_sliding[name].item()
+        below, above = (
+            calibrated_sliding[f"{name}_interval"].values - calibrated_sliding[name].item()
+        )
         assert -below == pytest.approx(QUANTILE * error, rel=0.06), name
         assert above == pytest.approx(QUANTILE * error, rel=0.06), name
 

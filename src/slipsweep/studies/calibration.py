@@ -23,6 +23,9 @@ _A_CYCLE = 0.1
 _MOVES = 0.1
 _FEWEST_IN_A_CYCLE = 12
 
+#: Channels, and the ends of them, at which only the end of a range is flat.
+_RANGES = {TABLE: (1, -1), "block_acceleration": (-1,), "relative_velocity": (1, -1)}
+
 #: Symbols and units of what is sought.
 _SYMBOL = ("Üy", "λ", "Δμ")
 _UNIT = (" m/s2", "", "")
@@ -135,7 +138,7 @@ def calibrate(
         found = estimate(observations)
         if "continuous" not in found.readings:
             for one in observations:
-                one.leave_out_upslope_slips()
+                one.leave_out_upslope_slips(found.of_test(one))
             if any(one.upslope for one in observations):
                 found = estimate(observations)
         statics = [_statics(one) for one in observations]
@@ -307,9 +310,12 @@ def _report(
     """
     sentence = "" if constant is None else constant.attrs["constant_friction"]
     slides = bool((results["permanent_displacement"] != 0.0).any())
-    clipped = [text for one in found.observations for text in _clipped(one.test)]
+    several = len(found.observations) > 1
+    names = [f"{one.test.name}: " if several else "" for one in found.observations]
+    named = list(zip(found.observations, names, strict=True))
+    clipped = [text for one, name in named for text in _clipped(one, name)]
     said = [*clipped, *([sentence] if sentence else misfit)]
-    said += [text for one in found.observations for text in _colours(one)]
+    said += [text for one, name in named for text in _colours(one, name)]
     for one in found.observations:
         motion = one.table_acceleration(found.lines_of(one)[0])
         first = float(motion[0])
@@ -332,6 +338,7 @@ def _report(
     elif not found.determined.all():
         said += _undetermined(found)
     contradictions = [text for one in found.observations for text in _contradiction(found, one)]
+    contradictions += [text for one, name in named for text in _outliers(found, one, name)]
     said += contradictions
     if (results["validity"] & variables.Validity.NOT_RECOUPLED).any():
         said.append(
@@ -375,45 +382,54 @@ def _statics(one: Observation) -> xr.Dataset:
     return friction.coefficients_of(table, block, slides, one.mu_s, one.theta, one.model.g)
 
 
-def _clipped(test: ShakingTest) -> list[str]:
+def _clipped(one: Observation, name: str) -> list[str]:
     """Return which channels are at the end of their range, in words.
 
     Tops at which a block holds its acceleration or its displacement, or bottoms at which it is at
     rest, are flat without that.
     """
-    sides = [
-        (TABLE, 1),
-        (TABLE, -1),
-        ("block_acceleration", -1),
-        ("relative_velocity", 1),
-        ("relative_velocity", -1),
-    ]
     texts = []
-    for name, sign in ((name, sign) for name, sign in sides if name in test.channels):
-        values = sign * test.channels[name]
-        end = float(np.nanmax(values))
-        samples = flat_top(values) if end > _MOVES * float(np.nanmax(np.abs(values))) else 0
-        if samples:
-            units = variables.HISTORY[name]["units"]
-            texts.append(
-                f"{test.name}: {name} is flat at its {'largest' if sign > 0 else 'smallest'} value, "
-                f"{sign * end:.4g} {units}, for {samples} samples, as of a sensor or converter at the "
-                "end of its range. What is cut off is not known, and the intervals do not include it: "
-                "test with a larger range."
-            )
+    for channel, signs in _RANGES.items():
+        values = one.test.channels.get(channel, np.zeros(1))
+        largest = float(np.nanmax(np.abs(values)))
+        ends = []
+        for sign in signs:
+            end = float(np.nanmax(sign * values))
+            if end > _MOVES * largest and flat_top(sign * values):
+                ends.append(f"{sign * end:.4g}")
+        if ends:
+            units = variables.HISTORY[channel]["units"]
+            texts += [
+                f"{name}{channel} is cut off: it is flat at {' and '.join(ends)} {units}, as of a "
+                "sensor or converter at the end of its range.",
+                "The intervals do not include what is cut off. Test with a larger range.",
+            ]
     return texts
 
 
-def _colours(one: Observation) -> list[str]:
-    """Return a sentence on coloured noise, if there is some."""
-    colours = {f"{TABLE} up to": one.motion.colour} | dict(zip(one.channels, one.colour, strict=True))
-    listed = ", ".join(f"{name} {colour:.2f}" for name, colour in colours.items() if colour > 0.0)
+def _colours(one: Observation, name: str) -> list[str]:
+    """Return sentences on coloured noise, if there is some."""
+    table = "" if one.motion.rests else "at most "
+    colours = [(TABLE, table, one.motion.colour)]
+    colours += [
+        (channel, "", colour) for channel, colour in zip(one.channels, one.colour, strict=True)
+    ]
+    listed = [
+        f"{bound}{colour:.2f} in {channel}" for channel, bound, colour in colours if colour > 0.0
+    ]
     if not listed:
         return []
-    return [
-        f"{one.test.name}: noise is coloured, neighbouring samples of it have a correlation: {listed}. "
-        "The intervals include this as noise of first order."
+    texts = [
+        f"{name}The noise is coloured. The correlation of neighbouring samples of it is "
+        f"{', '.join(listed)}.",
+        "Intervals and standard errors include it as noise of first order.",
     ]
+    if not one.motion.rests:
+        texts.append(
+            f"How slow the noise of {TABLE} is cannot be told while the table moves: the intervals "
+            "may be too narrow. Let the record begin with half a second at rest."
+        )
+    return texts
 
 
 def _misfits(found: Estimate) -> dict[str, float]:
@@ -482,6 +498,19 @@ def _contradiction(found: Estimate, one: Observation) -> list[str]:
     )
 
 
+def _outliers(found: Estimate, one: Observation, name: str) -> list[str]:
+    """Return which samples contradict the solution, in words."""
+    texts = []
+    for channel, (times, most) in one.contradicting(found.of_test(one)).items():
+        units = variables.HISTORY[channel]["units"]
+        samples = "1 sample" if times.size == 1 else f"{times.size} samples"
+        texts.append(
+            f"{name}{samples} of {channel} cannot be noise: up to {most:.3g} {units} off what is "
+            f"computed, first at {times[0]:.4g} s. A sensor failed there, or the solution is wrong."
+        )
+    return texts
+
+
 def _undetermined(found: Estimate) -> list[str]:
     """Which parameters the tests do not determine, why, and which measurement would."""
     tests = "these tests" if len(found.observations) > 1 else "this test"
@@ -489,7 +518,6 @@ def _undetermined(found: Estimate) -> list[str]:
     *others, last = (_SYMBOL[at] for at in missing)
     listed, are = (f"{', '.join(others)} and {last}", "are") if others else (last, "is")
     ranges = "; ".join(f"{_SYMBOL[at]} {_range(*found.intervals[at])}{_UNIT[at]}" for at in missing)
-    apart = " or ".join(f"{onset:.3g}" for onset in found.apart)
     yields = "held" in found.readings and not math.isfinite(found.intervals[1][1])
     crosses = bool({"crossed", "crossing"} & found.readings)
     why = {
@@ -510,11 +538,10 @@ def _undetermined(found: Estimate) -> list[str]:
         ): "Where Eq. 4 holds the block to the table until the table's acceleration has passed Üy, the "
         "motion does not depend on Üy.",
     }.get((yields, crosses), "")
-    two = (
-        f"Üy is about {apart} m/s2, and no value between: from either the block gains the same velocity."
-        if apart
-        else ""
-    )
+    two = ""
+    if found.apart:
+        onsets = " or ".join(f"{onset:.3g}" for onset in found.apart)
+        two = f"Several solutions fit: Üy is about {onsets} m/s2, and nothing between."
     return [
         f"{listed} {are} not determined by {tests}: 95 % intervals {ranges}.",
         *filter(None, [two, why]),

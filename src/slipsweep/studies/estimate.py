@@ -53,10 +53,12 @@ _LOOKS = np.arange(1, 33) / 33.0
 _CLOSE_LOOKS = np.arange(1, 160) / 160.0
 
 #: Minima that are followed, at this distance in Üy at least in parts of the peak, and the rise of
-#: the sum of squares above the least beyond which none can become the least.
+#: the sum of squares above the least beyond which none can become the least; the distance from
+#: which on minima are said to be several solutions.
 _MINIMA = 6
 _APART = 0.004
 _HOPELESS = 60.0
+_SEVERAL = 0.02
 
 
 class Scale:
@@ -250,6 +252,8 @@ class Search:
         allowed = [point for point in minima if self.above(self.at(point)) <= SQUARE]
         onsets: list[float] = []
         for low, high in itertools.pairwise(allowed):
+            if high[0] - low[0] < _SEVERAL:
+                continue
             between = [
                 _with(low, [0], part * low[0] + (1.0 - part) * high[0]) for part in (0.3, 0.5, 0.7)
             ]

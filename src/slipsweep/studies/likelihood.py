@@ -58,6 +58,12 @@ _TIMES = np.geomspace(1.0, 20.0, 100)
 #: Samples at rest at least that show the noise of a sensor.
 _AT_REST = 20
 
+#: Standard deviation of normal noise over its median; standard deviations, and parts of a channel's
+#: largest value, beyond which a sample contradicts the solution.
+_OF_MEDIAN = 1.4826
+_NO_NOISE = 7.0
+_NO_MISFIT = 0.01
+
 #: Steps of the derivatives by errors of the table's motion, in standard deviations.
 _STEP = 0.3
 
@@ -187,7 +193,7 @@ class Observation:
         self.wrong = np.zeros(self.motion.errors.shape[1])
         self.table_factor = 1.0
         self._jumps = np.zeros(0, dtype=np.int64)
-        self._of_sensor = np.zeros(test.times.size)
+        self._of_sensors = {name: np.zeros(test.times.size) for name in self.channels}
         self.peak = self.peak_of(self.first_sizes)
         self.upslope: list[float] = []
 
@@ -300,9 +306,13 @@ class Observation:
         near = np.array([last, same, first, 2.0 * last - before, 2.0 * first - after])
         low = near.min(axis=0)
         high = near.max(axis=0)
-        measured = (self.test.channels["block_acceleration"] - self._of_sensor)[self._jumps]
+        measured = self._without_lines("block_acceleration")[self._jumps]
         beyond = (measured - np.clip(measured, low, high)) * self._jump_scale
         return np.nan_to_num(np.sign(beyond) * np.maximum(np.abs(beyond) - _NOISE, 0.0), nan=1e3)
+
+    def _without_lines(self, name: str) -> Floats:
+        """Return a channel of the block less what its offset, drift and steps add."""
+        return np.asarray(self.test.channels[name] - self._of_sensors[name])
 
     def nuisances(self, parameters: Floats) -> tuple[Floats, Floats]:
         """Return the most likely errors of the table's motion, then sizes of `lines`, and their standard deviations."""
@@ -319,6 +329,28 @@ class Observation:
         """Return the root mean square of what nothing explains of each channel."""
         rests = zip(self._unexplained(parameters), self._by_channel(self._scale), strict=True)
         return [float(np.sqrt(np.mean((rest / scale) ** 2))) for rest, scale in rests]
+
+    def contradicting(self, parameters: Floats) -> dict[str, tuple[Floats, float]]:
+        """Return the times of samples that noise cannot explain, and how far off the farthest is.
+
+        The noise is measured by the median, so that these samples have no part in it.
+        """
+        history = self.forward(parameters, self.test.times)
+        rests = zip(self._unexplained(parameters), self._by_channel(self._scale), strict=True)
+        beyond = {}
+        for at, (rest, scale) in enumerate(rests):
+            times = self.test.times[self._counted[at]]
+            off = np.abs(rest / scale)
+            noise = _OF_MEDIAN * float(np.median(off))
+            if self.channels[at] == "block_acceleration" and self._jumps.size:
+                # these are less `_NOISE`
+                beside = np.abs(self._beyond_jumps(history)) / self._jump_scale
+                times = np.append(times, self.test.times[self._jumps])
+                off = np.append(off, beside + _NOISE * noise * (beside > 0.0))
+            contradicts = off > max(_NO_NOISE * noise, _NO_MISFIT * self.largest[at])
+            if contradicts.any():
+                beyond[self.channels[at]] = (np.sort(times[contradicts]), float(off.max()))
+        return beyond
 
     def noise_seen(self, parameters: Floats) -> list[float]:
         """Return the noise of each channel that does not rest on the model.
@@ -380,13 +412,22 @@ class Observation:
                 self.noise[at] = max(
                     self.noise[at] * np.sqrt(square / freedom), self._least_noise[at]
                 )
-            self.colour[at] = colour_of(rest, distances(self.test.times[self._counted[at]]))
+        self._estimate_colour(parameters)
         self.wrong = sizes[: self.wrong.size]
         self._widen_table_errors(parameters)
-        self._of_sensor = np.zeros(self.test.times.size)
+        self._of_sensors = {name: np.zeros(self.test.times.size) for name in self.channels}
         for line, size in zip(self.lines, sizes[self.wrong.size :], strict=True):
-            self._of_sensor += size * line.values * (line.channel == "block_acceleration")
+            self._of_sensors[line.channel] += size * line.values
         self.look_at_jumps([parameters, *others])
+
+    def _estimate_colour(self, parameters: Floats) -> None:
+        """Set the colour of the noise; of one that is the least a channel can have it is not seen."""
+        rests = self._by_channel(self._rest(self.forward(parameters, self.test.times)))
+        effects = self._by_channel(self._effects)
+        for at, counted in enumerate(self._counted):
+            if self.noise[at] > self._least_noise[at]:
+                apart = distances(self.test.times[counted])
+                self.colour[at] = colour_of(rests[at], effects[at], apart)
 
     def _widen_table_errors(self, parameters: Floats) -> None:
         """Multiply the errors of the table's motion by what the block's motion shows them to be larger.
@@ -436,24 +477,27 @@ class Observation:
             )
         return beside
 
-    def leave_out_upslope_slips(self) -> None:
-        """Leave out the samples of slips upslope, after each of which the displacement may have stepped."""
+    def leave_out_upslope_slips(self, parameters: Floats) -> None:
+        """Leave out the samples of slips upslope, after each of which the displacement may step."""
         times = self.test.times
-        channels = self.test.channels
-        if self.channels == ("block_acceleration",):  # no velocity
+        if "relative_velocity" in self.channels:
+            velocity = self._without_lines("relative_velocity")
+        elif "relative_displacement" in self.channels:
+            velocity = np.gradient(self._without_lines("relative_displacement"), times)
+        else:
             return
-        velocity = channels.get("relative_velocity")
-        if velocity is None:
-            velocity = np.gradient(channels["relative_displacement"], times)
-        noise = max(noise_of(velocity), 2e-3 * float(np.nanmax(np.abs(velocity))))
+        off = np.abs(velocity - self.forward(parameters, times)["relative_velocity"])
+        largest = float(np.nanmax(np.abs(velocity)))
+        noise = max(noise_of(velocity), _OF_MEDIAN * float(np.nanmedian(off)), 2e-3 * largest)
         upslope = np.nan_to_num(velocity) < -_UPSLOPE_NOISE * noise
         several = ndimage.binary_opening(upslope, np.ones(_UPSLOPE_SAMPLES))
         slips = ndimage.binary_dilation(several, iterations=3)
         self._use = self._use & ~slips
         for slip in runs_of(slips):
             self.upslope.append(float(times[slip.start]))
-            if "relative_displacement" in channels:
-                size = _LARGE * float(np.nanmax(np.abs(channels["relative_displacement"])))
+            if "relative_displacement" in self.channels:
+                displacement = self.test.channels["relative_displacement"]
+                size = _LARGE * float(np.nanmax(np.abs(displacement)))
                 name = f"upslope slip at {times[slip.start]:.4g} s"
                 step = size * (times > times[slip.stop - 1])
                 self.lines.append(Line(name, "relative_displacement", size, step))

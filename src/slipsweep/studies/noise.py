@@ -5,8 +5,11 @@ the distance Δt have the correlation ρ^(Δt/h), with ρ of neighbours and h th
 Such errors are made independent by subtracting from each what its neighbour says of it.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy import ndimage
+from scipy.linalg import cholesky, solve_triangular
 
 from slipsweep.studies.friction import Floats, noise_of
 
@@ -14,9 +17,12 @@ from slipsweep.studies.friction import Floats, noise_of
 #: through samples nor a sensor is better.
 LEAST_NOISE = 1e-4
 
-#: Correlations of neighbours below this many standard errors are chance; none is larger than that.
-_NO_CHANCE = 4.0
-MOST_COLOUR = 0.98
+#: Correlations of neighbouring samples of the noise that are tried; by how much −2 ln of the
+#: likelihood falls at least if noise is coloured; standard errors up to which a correlation may be
+#: chance.
+COLOURS = (0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.93, 0.95, 0.98)
+NO_CHANCE = 8.0
+_CHANCE = 4.0
 
 #: Distances in samples at which residuals are looked at, and the standard deviation of normal noise
 #: over that by its median, at most.
@@ -60,20 +66,45 @@ def whitened(values: Floats, links: Floats) -> Floats:
     return result
 
 
-def colour_of(values: Floats, apart: Floats) -> float:
-    """Return the correlation of neighbours in noise; 0 where it may be chance.
+def colour_of(rest: Floats, effects: Floats, apart: Floats) -> float:
+    """Return the correlation of neighbouring samples of the noise, of largest likelihood.
 
-    `apart` are the `distances` of the samples.
+    It is 0 where that may be chance.  `rest` are residuals, of which errors with the effects
+    `effects`, a column each and of unit variance, are a part; `apart` are `distances`.
     """
-    near = apart[1:] < 1.5
-    before = values[:-1][near]
-    after = values[1:][near]
-    size = float(np.sqrt(np.sum(before**2) * np.sum(after**2)))
-    if before.size < 8 or size == 0.0:
+    unlikely = [_unlikeliness(rest, effects, colour, apart) for colour in COLOURS]
+    return most_likely_colour(unlikely, 0.0)
+
+
+def most_likely_colour(unlikely: Sequence[float], allowance: float) -> float:
+    """Return the largest of `COLOURS` whose −2 ln likelihood is within `allowance` of the least.
+
+    It is 0 where white noise is hardly less likely than the best.
+    """
+    least = min(unlikely)
+    if unlikely[0] < least + NO_CHANCE:
         return 0.0
-    correlation = float(np.sum(before * after)) / size
-    is_chance = correlation < _NO_CHANCE / before.size**0.5
-    return 0.0 if is_chance else min(correlation, MOST_COLOUR)
+    return max(
+        colour
+        for colour, score in zip(COLOURS, unlikely, strict=True)
+        if score <= least + allowance
+    )
+
+
+def _unlikeliness(rest: Floats, effects: Floats, colour: float, apart: Floats) -> float:
+    """Return −2 ln of the likelihood of residuals of any size, but for a constant."""
+    links = colour**apart
+    independent = whitened(rest, links)
+    errors = whitened(effects, links)
+    root = cholesky(np.eye(errors.shape[1]) + errors.T @ errors, lower=True)
+    along = solve_triangular(root, errors.T @ independent, lower=True)
+    square = max(float(independent @ independent - along @ along), 1e-300)
+    variance = square / rest.size
+    return float(
+        rest.size * np.log(variance)
+        + np.sum(np.log(1.0 - links**2))
+        + 2.0 * np.sum(np.log(np.diag(root)))
+    )
 
 
 def is_first_order(innovations: Floats) -> bool:
@@ -84,12 +115,12 @@ def is_first_order(innovations: Floats) -> bool:
     """
     centred = innovations - innovations.mean()
     square = float(np.sum(centred**2))
-    limit = _NO_CHANCE / centred.size**0.5
+    limit = _CHANCE / centred.size**0.5
     lags = range(1, min(_LAGS, centred.size // 4) + 1)
     correlations = [float(centred[lag:] @ centred[:-lag]) / square for lag in lags]
     typical = 1.4826 * float(np.median(np.abs(centred)))
     tails = (square / centred.size) ** 0.5 / max(typical, 1e-300)
-    return max(map(abs, correlations)) < limit and tails < _TAILS
+    return bool(max(map(abs, correlations)) < limit and tails < _TAILS)
 
 
 def flat_top(values: Floats) -> int:

@@ -8,12 +8,20 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import BSpline, make_lsq_spline
 from scipy.linalg import block_diag, cho_solve_banded, cholesky, cholesky_banded, solve_triangular
 from scipy.sparse import csr_array, diags_array, hstack
 
 from slipsweep.studies.friction import Floats, noise_of
-from slipsweep.studies.noise import LEAST_NOISE, converter_noise, distances
+from slipsweep.studies.noise import (
+    COLOURS,
+    LEAST_NOISE,
+    colour_of,
+    converter_noise,
+    distances,
+    most_likely_colour,
+)
 
 #: Degree of the spline, and most coefficients whose uncertainty is followed; each costs a solution.
 _DEGREE = 3
@@ -24,12 +32,16 @@ _MOST_SHAPES = 150
 _SPACINGS = (64, 48, 32, 24, 16, 12, 10, 8, 6, 5, 4, 3, 2)
 _FINER = 2
 
-#: Correlations of neighbouring samples of the noise that are tried.
-_COLOURS = (0.0, 0.3, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 0.98)
+#: Samples for each coefficient, and samples at most, by which the colour of the noise is sought;
+#: −2 ln of the likelihood within which a slower noise is as likely; fewest samples at rest that
+#: show the colour.
 _COLOUR_SPACING = 4
 _MOST_SAMPLES = 1500
-_NO_CHANCE = 8.0
 _AS_LIKELY = 4.0
+_SHOWS_COLOUR = 50
+
+#: Standard deviation of the level of a sensor at rest, in those of its noise: no bound, in effect.
+_ANY_LEVEL = 1e3
 
 #: Variances of the motion over that of the noise that are tried, for its fastest part.
 _SIZES = np.geomspace(1e-14, 1e4, 91)
@@ -48,7 +60,7 @@ class TableMotion(NamedTuple):
     `basis` @ `errors` are independent errors that it may have, one a column, each of one standard
     deviation; few functions in `basis` differ from 0 at a point.  `noise` is the standard deviation
     of the noise of the record, m/s², and `colour` the correlation of neighbouring samples of it.
-    The table is at rest until `begins`, s.
+    The table is at rest until `begins`, s.  `rests` says if it rests long enough to show the colour.
     """
 
     times: Floats
@@ -58,6 +70,7 @@ class TableMotion(NamedTuple):
     noise: float
     colour: float
     begins: float
+    rests: bool
 
     def with_errors(self, sizes: Floats) -> Floats:
         """Return the acceleration with so many standard deviations of each error."""
@@ -121,7 +134,13 @@ def table_motion(times: Floats, acceleration: Floats) -> TableMotion:
     record = _Record(times, acceleration, np.zeros(times.size), 0.0)
     best, kinked = _with_kinks(record, _best_fit(record))
     is_noisy = best.noise > LEAST_NOISE * np.abs(acceleration).max()
-    colour = _colour(times, acceleration, [kink for kink, _ in kinked]) if is_noisy else 0.0
+    kinks = [kink for kink, _ in kinked]
+    at_rest = _at_rest(times, kinks)
+    rests = bool(at_rest.sum() >= _SHOWS_COLOUR)
+    colour = 0.0
+    if is_noisy:
+        by_rest = _colour_at_rest(times, acceleration, at_rest) if rests else 0.0
+        colour = max(by_rest, _colour(times, acceleration, kinks))
     if colour > 0.0:
         record = _Record(times, acceleration, colour ** distances(times), colour)
         best, kinked = _with_kinks(record, _best_fit(record))
@@ -155,7 +174,14 @@ def table_motion(times: Floats, acceleration: Floats) -> TableMotion:
     width = np.minimum(np.diff(fine, prepend=-np.inf), np.diff(fine, append=np.inf))
     smooth = smooth - width**2 / 12.0 * best.spline(fine, nu=2)
     return TableMotion(
-        fine, smooth, csr_array(hstack(basis)), block_diag(*errors), noise, record.colour, begins
+        fine,
+        smooth,
+        csr_array(hstack(basis)),
+        block_diag(*errors),
+        noise,
+        record.colour,
+        begins,
+        rests,
     )
 
 
@@ -168,6 +194,21 @@ def _best_fit(record: _Record) -> _Fitted:
     ]
     chosen = min(range(len(fits)), key=lambda at: fits[at].score)
     return fits[min(chosen + _FINER, len(fits) - 1)]
+
+
+def _at_rest(times: Floats, kinks: Sequence[_Kink]) -> NDArray[np.bool_]:
+    """Return which samples are before the shaking begins or after it ends."""
+    at_rest = np.zeros(times.size, dtype=bool)
+    for kink in kinks:
+        at_rest |= times < kink.time if kink.end == 0 else times > kink.time
+    return at_rest
+
+
+def _colour_at_rest(times: Floats, values: Floats, at_rest: NDArray[np.bool_]) -> float:
+    """Return the colour of the noise by samples at rest, whose level may have an offset."""
+    level = np.full((int(at_rest.sum()), 1), _ANY_LEVEL)
+    rest = values[at_rest] / float(np.std(values[at_rest]))
+    return colour_of(rest, level, distances(times[at_rest]))
 
 
 def _colour(times: Floats, values: Floats, kinks: Sequence[_Kink]) -> float:
@@ -195,16 +236,11 @@ def _colour(times: Floats, values: Floats, kinks: Sequence[_Kink]) -> float:
     )
     apart = distances(times)
     unlikely = []
-    for colour in _COLOURS:
+    for colour in COLOURS:
         record = _Record(times, values, colour**apart, colour)
         unlikely.append(_unlikeliness(record, record.design(knots).toarray(), third, free))
-    likely = np.array(unlikely) < min(unlikely) + _AS_LIKELY
     # slow noise and a slow motion look the same: the most colour that the samples allow
-    return (
-        0.0
-        if unlikely[0] < min(unlikely) + _NO_CHANCE
-        else float(np.max(_COLOURS, where=likely, initial=0.0))
-    )
+    return most_likely_colour(unlikely, _AS_LIKELY)
 
 
 def _unlikeliness(record: _Record, design: Floats, third: Floats, free: int) -> float:
