@@ -15,7 +15,7 @@ from slipsweep.studies import friction
 from slipsweep.studies.estimate import Estimate, cycle_estimate, estimate
 from slipsweep.studies.friction import Floats
 from slipsweep.studies.likelihood import SOUGHT, Observation, runs_of
-from slipsweep.studies.noise import flat_top
+from slipsweep.studies.noise import flat_top, noisy_flat_top
 
 #: The peak of a cycle at least, and what a table that moves exceeds, in parts of its largest
 #: acceleration; fewest samples of a cycle.
@@ -141,7 +141,7 @@ def calibrate(
                 one.leave_out_upslope_slips(found.of_test(one))
             if any(one.upslope for one in observations):
                 found = estimate(observations)
-        statics = [_statics(one) for one in observations]
+        statics = [_statics(one, found) for one in observations]
         constant = next((one for one in statics if one.attrs["constant_friction"]), None)
         misfit = (
             [] if constant is not None else _misfit(found, lambda name: estimate(observed(name)))
@@ -169,16 +169,15 @@ def _of_test(one: Observation, found: Estimate, cycles: bool) -> xr.Dataset:
     test = one.test
     parameters = found.of_test(one)
     history = one.forward(parameters, one.test.times)
-    added, removed = _removed(one, found)
+    removed = _removed(one, found)[1]
     about = variables.CALIBRATION_SERIES | variables.MEASURED_FRICTION
-    series = {f"measured_{name}": values - added[name] for name, values in test.channels.items()}
+    channels = _measured(one, found)
+    series = {f"measured_{name}": values for name, values in channels.items()}
     series |= {f"computed_{name}": values for name, values in history.items()}
-    block = _block_acceleration(test)
+    block = _block_acceleration(test, channels)
     if block is not None:
-        block = block - added.get("block_acceleration", 0.0)
-        table = series[f"measured_{TABLE}"]
         series["friction_coefficient"] = friction.eq1_friction(
-            table, block, one.theta, one.mu_s, one.model.g
+            channels[TABLE], block, one.theta, one.mu_s, one.model.g
         )
         series["free_body_friction"] = friction.free_body_friction(block, one.theta, one.model.g)
     data: dict[str, Any] = {name: ("time", values, about[name]) for name, values in series.items()}
@@ -199,6 +198,12 @@ def _of_test(one: Observation, found: Estimate, cycles: bool) -> xr.Dataset:
     time = {"time": ("time", test.times, {"units": "s", "long_name": "time"})}
     dataset = xr.Dataset(data, time, {"removed": "; ".join(removed) or "nothing"})
     return dataset.merge(_cycles(one, found)) if cycles else dataset
+
+
+def _measured(one: Observation, found: Estimate) -> dict[str, Floats]:
+    """Return the channels of a test, less offsets, drifts and steps."""
+    added, _ = _removed(one, found)
+    return {name: values - added[name] for name, values in one.test.channels.items()}
 
 
 def _removed(one: Observation, found: Estimate) -> tuple[dict[str, Floats], list[str]]:
@@ -361,25 +366,41 @@ def _report(
     )
 
 
-def _block_acceleration(test: ShakingTest) -> Floats | None:
-    """The block's acceleration, measured or from the relative velocity; None without either."""
-    if "block_acceleration" in test.channels or "relative_velocity" not in test.channels:
-        return test.channels.get("block_acceleration")
-    return np.asarray(
-        test.channels[TABLE] - np.gradient(test.channels["relative_velocity"], test.times)
-    )
+def _block_acceleration(test: ShakingTest, channels: Mapping[str, Floats]) -> Floats | None:
+    """Return the block's acceleration, measured or from its velocity; None without either."""
+    if "block_acceleration" in channels or "relative_velocity" not in channels:
+        return channels.get("block_acceleration")
+    return np.asarray(channels[TABLE] - np.gradient(channels["relative_velocity"], test.times))
 
 
-def _statics(one: Observation) -> xr.Dataset:
+def _slides(
+    one: Observation, found: Estimate, table: Floats, block: Floats
+) -> tuple[list[slice], float]:
+    """Return the slides of a test, and the threshold by which they are told from noise."""
+    threshold = friction.threshold_of(one.test.channels[TABLE], block)[0]
+    if "block_acceleration" in one.channels:  # neighbours show too little of coloured noise
+        row = one.channels.index("block_acceleration")
+        noise = math.hypot(
+            one.noise_seen(found.of_test(one))[row], one.motion.noise * (one.motion.colour > 0.0)
+        )
+        threshold = max(threshold, friction.NOISE_IN_THRESHOLD * noise)
+    return friction.slides_of(one.test.times, table, block, threshold), threshold
+
+
+def _statics(one: Observation, found: Estimate) -> xr.Dataset:
     """Friction by statics; nothing where neither the block's acceleration nor its velocity is measured."""
-    block = _block_acceleration(one.test)
+    block = _block_acceleration(one.test, _measured(one, found))
     if block is None:
         return xr.Dataset(attrs={"constant_friction": ""})
-    table = np.interp(one.test.times, one.motion.times, one.motion.acceleration)
-    slides = friction.slides_of(
-        one.test.times, table, block, friction.threshold_of(table, block)[0]
-    )
+    table = _smooth_table(one, found)
+    slides, _ = _slides(one, found, table, block)
     return friction.coefficients_of(table, block, slides, one.mu_s, one.theta, one.model.g)
+
+
+def _smooth_table(one: Observation, found: Estimate) -> Floats:
+    """Return the table's motion at the samples, less offset and drift of its sensor."""
+    motion = one.table_acceleration(found.lines_of(one)[0])
+    return np.interp(one.test.times, one.motion.times, motion)
 
 
 def _clipped(one: Observation, name: str) -> list[str]:
@@ -395,7 +416,10 @@ def _clipped(one: Observation, name: str) -> list[str]:
         ends = []
         for sign in signs:
             end = float(np.nanmax(sign * values))
-            if end > _MOVES * largest and flat_top(sign * values):
+            is_flat = flat_top(sign * values) > 0
+            if channel == TABLE and not is_flat:
+                is_flat = noisy_flat_top(sign * values) > 0
+            if is_flat and end > _MOVES * largest:
                 ends.append(f"{sign * end:.4g}")
         if ends:
             units = variables.HISTORY[channel]["units"]
@@ -470,14 +494,12 @@ def _misfit(found: Estimate, with_drift: Callable[[str], Estimate]) -> list[str]
 
 
 def _contradiction(found: Estimate, one: Observation) -> list[str]:
-    """Say if the interval of Üy begins above the accelerations at which the block was seen to begin to slide."""
+    """Say if the interval of Üy begins above where the block was seen to begin to slide."""
     if "block_acceleration" not in one.channels or "continuous" in found.readings:
         return []
-    times = one.test.times
-    block = one.test.channels["block_acceleration"]
-    table = np.interp(times, one.motion.times, one.motion.acceleration)
-    threshold = friction.threshold_of(one.test.channels[TABLE], block)[0]
-    slides = friction.slides_of(times, table, block, threshold)
+    block = _measured(one, found)["block_acceleration"]
+    table = _smooth_table(one, found)
+    slides, threshold = _slides(one, found, table, block)
     onsets = np.array(
         [friction.onset_acceleration(table, block, slide, threshold) for slide in slides]
     )
@@ -488,8 +510,8 @@ def _contradiction(found: Estimate, one: Observation) -> list[str]:
     least = found.intervals[0][0]
     seen = np.median(onsets)
     text = (
-        f"The 95 % interval of Üy begins at {least:.3g} m/s2, but the block was seen to begin to slide at {seen:.3g} m/s2: "
-        "the fit contradicts the test."
+        f"The 95 % interval of Üy begins at {least:.3g} m/s2, but the block was seen to begin to "
+        f"slide at {seen:.3g} m/s2: the fit contradicts the test."
     )
     return (
         [text]

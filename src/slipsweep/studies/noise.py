@@ -8,6 +8,7 @@ Such errors are made independent by subtracting from each what its neighbour say
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.linalg import cholesky, solve_triangular
 
@@ -37,6 +38,13 @@ _FLAT = 4
 #: rounded has several times as many values as are equal to the largest, and a clipped one few.
 _STEPS = 24.0
 _NOISES = 1.5
+
+#: Noise on a flat top: standard deviations of it from the largest value to the foot of the top, and
+#: further down; how many times as many samples lie in the top as below it, and how many at least.
+_TOP = 5.0
+_BELOW = 13.0
+_CROWDED = 2.5
+_IN_TOP = 12
 
 
 def converter_noise(values: Floats) -> float:
@@ -132,9 +140,7 @@ def flat_top(values: Floats) -> int:
     finite = values[np.isfinite(values)]
     top = float(np.max(finite))
     rounding = 1e-12 * float(np.ptp(finite))
-    runs = ndimage.label(finite >= top - rounding)[0]
-    lengths = np.bincount(runs)[1:]
-    flat = int(np.sum(lengths[lengths >= _IN_TURN]))
+    flat = _in_runs(finite >= top - rounding)
     steps = np.diff(np.unique(finite))
     steps = steps[steps > rounding]
     if flat < _FLAT or not steps.size:
@@ -142,3 +148,22 @@ def flat_top(values: Floats) -> int:
     band = max(_STEPS * float(steps.min()), _NOISES * noise_of(values))
     beside = int(np.sum((finite < top - rounding) & (finite > top - band)))
     return flat if flat > beside else 0
+
+
+def _in_runs(holds: NDArray[np.bool_]) -> int:
+    """Return how many samples at which something holds do not stand alone or in pairs."""
+    lengths = np.bincount(ndimage.label(holds)[0])[1:]
+    return int(np.sum(lengths[lengths >= _IN_TURN]))
+
+
+def noisy_flat_top(values: Floats) -> int:
+    """Return how many samples of a motion lie in a flat top under noise; else 0.
+
+    A parabola has about as many samples within 5 standard deviations of the noise of the largest
+    value as within the next 8; a top that was cut off before the noise was added has many more.
+    """
+    noise = max(noise_of(values), converter_noise(values))
+    depth = float(np.max(values)) - values
+    top = _in_runs(depth < _TOP * noise)
+    below = int(np.sum((depth >= _TOP * noise) & (depth < _BELOW * noise)))
+    return top if top >= _IN_TOP and top > _CROWDED * below else 0

@@ -206,9 +206,11 @@ def _at_rest(times: Floats, kinks: Sequence[_Kink]) -> NDArray[np.bool_]:
 
 def _colour_at_rest(times: Floats, values: Floats, at_rest: NDArray[np.bool_]) -> float:
     """Return the colour of the noise by samples at rest, whose level may have an offset."""
+    scatter = float(np.std(values[at_rest]))
+    if scatter <= converter_noise(values):
+        return 0.0
     level = np.full((int(at_rest.sum()), 1), _ANY_LEVEL)
-    rest = values[at_rest] / float(np.std(values[at_rest]))
-    return colour_of(rest, level, distances(times[at_rest]))
+    return colour_of(values[at_rest] / scatter, level, distances(times[at_rest]))
 
 
 def _colour(times: Floats, values: Floats, kinks: Sequence[_Kink]) -> float:
