@@ -37,6 +37,13 @@ def clean() -> dict[str, xr.Dataset]:
     }
 
 
+@pytest.fixture(scope="module")
+def noisy(clean: dict[str, xr.Dataset]) -> dict[str, xr.Dataset]:
+    return {
+        name: calibrated(measured(test, seed=1), name, cycles=True) for name, test in clean.items()
+    }
+
+
 def calibrated(test: Any, mode: str = "stick_slip", **options: Any) -> xr.Dataset:
     case = CALIBRATED[mode]
     return slipsweep.calibrate(test, case["theta"], case["mu_s"], **{"cycles": False, **options})
@@ -57,8 +64,8 @@ def test_without_noise_the_parameters_come_back(clean: dict[str, xr.Dataset], mo
 
 
 @pytest.mark.parametrize("mode", CALIBRATED)
-def test_noise_digitisation_and_cycles(clean: dict[str, xr.Dataset], mode: str) -> None:
-    found = calibrated(measured(clean[mode], seed=1), mode, cycles=True)
+def test_noise_digitisation_and_cycles(noisy: dict[str, xr.Dataset], mode: str) -> None:
+    found = noisy[mode]
     case = CALIBRATED[mode]
     check_intervals(found, case)
     for name in ("block_acceleration", "relative_velocity", "relative_displacement"):
@@ -68,7 +75,7 @@ def test_noise_digitisation_and_cycles(clean: dict[str, xr.Dataset], mode: str) 
     assert found.sizes["cycle"] == case["excitation"].cycles
     for name in SOUGHT[1:]:
         off = (found[f"cycle_{name}"] - case[name]) / found[f"cycle_{name}_error"]
-        assert np.abs(off).max() < 4.5, name
+        assert 0.5 < np.abs(off).max() < 3.5, name
     if mode == "stick_slip":
         top = (
             found.computed_block_acceleration.where(found.computed_relative_velocity > 0)
@@ -168,10 +175,10 @@ def test_samples_that_contradict_the_solution_are_named(clean: dict[str, xr.Data
     test = measured(clean["stick_slip"], seed=1, noise=0.005)
     # while the block follows Eq. 4
     fastest = int(np.argmax(test.ground_acceleration.values))
-    test.block_acceleration.values[fastest - 3 : fastest + 3] += 0.5
+    test.block_acceleration.values[fastest - 3 : fastest + 3] += 0.3
     found = calibrated(test)
     *_, finding = found.attrs["findings"].splitlines()
-    assert re.match(r"6 samples of block_acceleration cannot be noise: up to 0\.[456]", finding)
+    assert re.match(r"6 samples of block_acceleration cannot be noise: up to 0\.[234]", finding)
     assert f"first at {test.time.values[fastest - 3]:.4g} s" in finding
     assert found.attrs["model_table"].startswith("# WARNING: not ready for use.")
 
@@ -261,7 +268,8 @@ def test_displacement_alone_does_not_tell_decay_from_excess(clean: dict[str, xr.
 
 
 def test_sensors_at_fault(clean: dict[str, xr.Dataset]) -> None:
-    test = measured(clean["stick_slip"].isel(time=slice(None, None, 2)), seed=4)
+    responses = ["block_acceleration", "relative_displacement"]
+    test = measured(clean["stick_slip"].isel(time=slice(None, None, 2)), 4, responses=responses)
     test.relative_displacement.values[:] += 0.01 + 0.2 * test.time.values
     found = calibrated(test)
     first, second, *_ = found.attrs["findings"].splitlines()
@@ -277,15 +285,14 @@ def test_sensors_at_fault(clean: dict[str, xr.Dataset]) -> None:
     )
     test.ground_acceleration.values[:] += 0.2
     drift = 0.2 * float(np.ptp(test.time.values))
-    for drifts in ("relative_displacement", "all"):
-        asked = calibrated(test, drift=drifts, offset="ground_acceleration")
-        check_intervals(asked, CALIBRATED["stick_slip"])
-        for name, true in (
-            ("drift of relative_displacement", drift),
-            ("offset of ground_acceleration", 0.2),
-        ):
-            (said,) = re.findall(rf"{name}: ([\d.]+) ± ([\d.]+)", asked.attrs["removed"])
-            assert abs(float(said[0]) - true) < min(3.5 * float(said[1]), 0.1 * true), name
+    asked = calibrated(test, drift="relative_displacement", offset="all")
+    check_intervals(asked, CALIBRATED["stick_slip"])
+    for name, true in (
+        ("drift of relative_displacement", drift),
+        ("offset of ground_acceleration", 0.2),
+    ):
+        (said,) = re.findall(rf"{name}: ([\d.]+) ± ([\d.]+)", asked.attrs["removed"])
+        assert abs(float(said[0]) - true) < min(3.0 * float(said[1]), 0.1 * true), name
 
 
 def test_unequal_sampling_gaps_and_an_early_end(clean: dict[str, xr.Dataset]) -> None:
@@ -312,13 +319,13 @@ def test_a_block_that_slips_upslope(clean: dict[str, xr.Dataset]) -> None:
 
 
 def test_a_record_that_begins_in_motion_is_named(clean: dict[str, xr.Dataset]) -> None:
-    test = measured(clean["stick_slip"], seed=15)
+    test = measured(clean["stick_slip"], seed=15, responses=["block_acceleration"])
     late = calibrated(test.isel(time=slice(int(np.argmax(test.time.values > 1.12)), None, 2)))
     assert "The table moves as the record begins, at " in late.attrs["findings"]
 
 
-def test_the_tables_to_paste_run(clean: dict[str, xr.Dataset], tmp_path: Path) -> None:
-    found = calibrated(measured(clean["stick_slip"], seed=11))
+def test_the_tables_to_paste_run(noisy: dict[str, xr.Dataset], tmp_path: Path) -> None:
+    found = noisy["stick_slip"]
     given = {"theta": 5, "mu_s": 0.38, "amplitude": 3, "frequency": 2}
     axes = "".join(f"\n[axes.{name}]\nvalues = [{value}]\n" for name, value in given.items())
     path = tmp_path / "pasted.toml"

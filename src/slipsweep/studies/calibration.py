@@ -143,9 +143,9 @@ def calibrate(
                 found = estimate(observations)
         statics = [_statics(one, found) for one in observations]
         constant = next((one for one in statics if one.attrs["constant_friction"]), None)
-        misfit = (
-            [] if constant is not None else _misfit(found, lambda name: estimate(observed(name)))
-        )
+        clipped = [text for one, name in _named(observations) for text in _clipped(one, name)]
+        is_explained = constant is not None or bool(clipped)
+        misfit = [] if is_explained else _misfit(found, lambda name: estimate(observed(name)))
         parts = [_of_test(one, found, cycles) for one in observations]
         whole = (
             parts[0]
@@ -159,7 +159,7 @@ def calibrate(
         **(tests[0].attrs if len(tests) == 1 else {"tests": ", ".join(one.name for one in tests)}),
         **options.MODELS.attributes(chosen),
         "removed": "; ".join(dict.fromkeys(one.attrs["removed"] for one in parts)),
-        **_report(found, whole, constant, misfit),
+        **_report(found, whole, constant, clipped, misfit),
     }
     return whole
 
@@ -304,21 +304,29 @@ def _of_all(found: Estimate) -> xr.Dataset:
     return xr.Dataset(data, coords)
 
 
-def _report(
-    found: Estimate, results: xr.Dataset, constant: xr.Dataset | None, misfit: Sequence[str]
-) -> dict[str, str]:
-    """All that must be said of a calibration, as attributes of its results.
+def _named(observations: Sequence[Observation]) -> list[tuple[Observation, str]]:
+    """Return tests, each with the beginning of a sentence on it: its name, if there are several."""
+    several = len(observations) > 1
+    return [(one, f"{one.test.name}: " if several else "") for one in observations]
 
-    `constant` are the coefficients of a test in which friction was constant, `misfit` sentences.
+
+def _report(
+    found: Estimate,
+    results: xr.Dataset,
+    constant: xr.Dataset | None,
+    clipped: Sequence[str],
+    misfit: Sequence[str],
+) -> dict[str, str]:
+    """Return all that must be said of a calibration, as attributes of its results.
+
+    `constant` are the coefficients of a test in which friction was constant, `clipped` and `misfit`
+    sentences.
     The tables for a sweep file are commented out where the calibration has failed or determines too
     little.
     """
     sentence = "" if constant is None else constant.attrs["constant_friction"]
     slides = bool((results["permanent_displacement"] != 0.0).any())
-    several = len(found.observations) > 1
-    names = [f"{one.test.name}: " if several else "" for one in found.observations]
-    named = list(zip(found.observations, names, strict=True))
-    clipped = [text for one, name in named for text in _clipped(one, name)]
+    named = _named(found.observations)
     said = [*clipped, *([sentence] if sentence else misfit)]
     said += [text for one, name in named for text in _colours(one, name)]
     for one in found.observations:
@@ -399,7 +407,7 @@ def _statics(one: Observation, found: Estimate) -> xr.Dataset:
 
 def _smooth_table(one: Observation, found: Estimate) -> Floats:
     """Return the table's motion at the samples, less offset and drift of its sensor."""
-    motion = one.table_acceleration(found.lines_of(one)[0])
+    motion = one.recorded_acceleration(found.lines_of(one)[0])
     return np.interp(one.test.times, one.motion.times, motion)
 
 

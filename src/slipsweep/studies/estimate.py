@@ -40,10 +40,12 @@ _DECAYS = (0.25, 0.5, 1.0, 2.0, 4.0)
 _EXCESS = (0.02, 0.1, 0.25)
 
 #: Starts that are followed roughly, and to the end; rounds at most in which motion, noise and
-#: samples at jumps settle.
+#: samples at jumps settle, and the largest change of a noise, in parts of it, or of a correlation
+#: with which they have.
 _ROUGH = 8
 _FINE = 4
-_ROUNDS = 5
+_ROUNDS = 6
+_SETTLED = 0.1
 
 #: Least noise in the stages of the search, in parts of a channel's largest value, and values of Üy
 #: in parts of the peak at which the second stage looks for minima: with λ and Δμ fitted, and as
@@ -401,17 +403,20 @@ def estimate(observations: Sequence[Observation]) -> Estimate:
     """Calibrate one or several tests of one interface."""
     scale = Scale(observations)
     starts = _first_minima(observations, scale)
+    change = math.inf
     for turn in range(_ROUNDS):
         search = _search(scale, observations, starts[0])
         for start in starts:
             search.follow(start)
         if turn == 0:
             _try_branches(search, scale)
-        elif search.square(starts[0]) - search.least < 0.1:
+        elif change < _SETTLED and search.square(starts[0]) - search.least < 0.1:
             break
         starts = search.candidates()
-        for number, one in enumerate(observations):
+        change = max(
             one.settle(*_solutions(scale, starts, number))
+            for number, one in enumerate(observations)
+        )
     width = QUANTILE * np.sqrt(np.diag(_covariance(search.slopes(search.best))))
     intervals = search.intervals(np.where(np.isfinite(width), np.clip(width, 1e-5, 0.3), 0.1))
     intervals[0] = _beyond_mode_limit(intervals[0], search.best, observations, scale)

@@ -201,9 +201,16 @@ class Observation:
         """Return the table's acceleration at the points of `motion`, less offset and drift of these sizes."""
         return np.asarray(self.motion.with_errors(self.wrong) - self._table_lines @ sizes)
 
+    def recorded_acceleration(self, sizes: Floats) -> Floats:
+        """Return the table's acceleration at the points of `motion` by its own record alone.
+
+        It is less offset and drift of these sizes, and does not depend on the model.
+        """
+        return np.asarray(self.motion.acceleration - self._table_lines @ sizes)
+
     def peak_of(self, sizes: Floats) -> float:
         """Return the largest acceleration of the table, less offset and drift of these sizes."""
-        return float(np.max(self.motion.acceleration - self._table_lines @ sizes))
+        return float(np.max(self.recorded_acceleration(sizes)))
 
     def record(self, sizes: Floats) -> Record:
         """Return the table's motion, less offset and drift of these sizes."""
@@ -393,9 +400,10 @@ class Observation:
         linear = Linear(whitened(effects, self._links)[rows])
         return lambda parameters: linear.independent(whitened(rest(parameters), self._links)[rows])
 
-    def settle(self, parameters: Floats, others: Sequence[Floats] = ()) -> None:
-        """Estimate noise that is not given and its colour, and take the table's motion as most likely.
+    def settle(self, parameters: Floats, others: Sequence[Floats] = ()) -> float:
+        """Estimate noise that is not given and its colour, and the table's motion.
 
+        Return the largest change of a noise, in parts of it, or of a correlation.
         `others` are further parameters that may be right: samples beside jumps of the computed
         acceleration count as such for all.
         """
@@ -404,6 +412,8 @@ class Observation:
         rests = self._unexplained(parameters)
         links = self._by_channel(self._links)
         sizes = self.nuisances(parameters)[0]
+        noise = self.noise.copy()
+        colour = self.colour.copy()
         for at, (rest, part) in enumerate(zip(rests, leverage, strict=True)):
             weight = weights[at] * self.noise[at]
             freedom = float(np.sum(weight**2)) - float(np.sum(part)) - 1.0
@@ -419,6 +429,9 @@ class Observation:
         for line, size in zip(self.lines, sizes[self.wrong.size :], strict=True):
             self._of_sensors[line.channel] += size * line.values
         self.look_at_jumps([parameters, *others])
+        return float(
+            max(np.abs(self.noise / noise - 1.0).max(), np.abs(self.colour - colour).max())
+        )
 
     def _estimate_colour(self, parameters: Floats) -> None:
         """Set the colour of the noise; of one that is the least a channel can have it is not seen."""
@@ -438,15 +451,18 @@ class Observation:
         rest = whitened(self._rest(self.forward(parameters, self.test.times)), self._links)
         values, deviations = self.linear.most_likely(rest)
         known = float(np.sum(1.0 - deviations[:number] ** 2))
-        if np.sum(values[:number] ** 2) < known + _WIDER * (2.0 * known) ** 0.5:
+        expected = known + _WIDER * (2.0 * known) ** 0.5
+        if self.table_factor == 1.0 and np.sum(values[:number] ** 2) < expected:
             return
         effects = whitened(self._effects, self._links)
         of_sensors = np.linalg.qr(effects[:, number:])[0]
         of_table = effects[:, :number] - of_sensors @ (of_sensors.T @ effects[:, :number])
         left, sizes, _ = np.linalg.svd(of_table, full_matrices=False)
         squares = (left.T @ rest) ** 2
-        variances = 1.0 + np.outer(_TIMES**2, sizes**2)
-        factor = _TIMES[np.argmin(np.sum(np.log(variances) + squares / variances, axis=1))]
+        # as first estimated, with noise that had not settled, they may be too large
+        factors = _TIMES / self.table_factor
+        variances = 1.0 + np.outer(factors**2, sizes**2)
+        factor = factors[np.argmin(np.sum(np.log(variances) + squares / variances, axis=1))]
         self.table_factor *= float(factor)
         self.motion = self.motion._replace(errors=factor * self.motion.errors)
         self.wrong = self.wrong / factor

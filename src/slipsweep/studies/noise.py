@@ -10,7 +10,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
-from scipy.linalg import cholesky, solve_triangular
 
 from slipsweep.studies.friction import Floats, noise_of
 
@@ -19,10 +18,11 @@ from slipsweep.studies.friction import Floats, noise_of
 LEAST_NOISE = 1e-4
 
 #: Correlations of neighbouring samples of the noise that are tried; by how much −2 ln of the
-#: likelihood falls at least if noise is coloured; standard errors up to which a correlation may be
-#: chance.
+#: likelihood falls at least if noise is coloured; variances of the noise that are tried; standard
+#: errors up to which a correlation may be chance.
 COLOURS = (0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.93, 0.95, 0.98)
 NO_CHANCE = 8.0
+_VARIANCES = np.geomspace(0.01, 100.0, 81)
 _CHANCE = 4.0
 
 #: Distances in samples at which residuals are looked at, and the standard deviation of normal noise
@@ -100,19 +100,21 @@ def most_likely_colour(unlikely: Sequence[float], allowance: float) -> float:
 
 
 def _unlikeliness(rest: Floats, effects: Floats, colour: float, apart: Floats) -> float:
-    """Return −2 ln of the likelihood of residuals of any size, but for a constant."""
+    """Return −2 ln of the largest likelihood of residuals with noise of any size."""
     links = colour**apart
     independent = whitened(rest, links)
     errors = whitened(effects, links)
-    root = cholesky(np.eye(errors.shape[1]) + errors.T @ errors, lower=True)
-    along = solve_triangular(root, errors.T @ independent, lower=True)
-    square = max(float(independent @ independent - along @ along), 1e-300)
-    variance = square / rest.size
-    return float(
-        rest.size * np.log(variance)
-        + np.sum(np.log(1.0 - links**2))
-        + 2.0 * np.sum(np.log(np.diag(root)))
+    squares, vectors = np.linalg.eigh(errors.T @ errors)
+    matter = squares > 1e-4
+    along = vectors[:, matter].T @ (errors.T @ independent) / np.sqrt(squares[matter])
+    outside = max(float(independent @ independent - along @ along), 0.0)
+    variances = squares[matter] + _VARIANCES[:, None]
+    scores = (
+        (rest.size - along.size) * np.log(_VARIANCES)
+        + outside / _VARIANCES
+        + np.sum(np.log(variances) + along**2 / variances, axis=1)
     )
+    return float(np.min(scores) + np.sum(np.log(1.0 - links**2)))
 
 
 def is_first_order(innovations: Floats) -> bool:
