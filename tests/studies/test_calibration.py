@@ -154,7 +154,7 @@ def test_several_minima_that_fit_are_several_solutions() -> None:
 
 def test_a_second_minimum_of_an_exact_test_is_not_the_answer() -> None:
     """With Üy 1.010 m/s2 the block would have gained the same velocity up to the onset."""
-    case = {
+    case: dict[str, Any] = {
         "theta": 3.8,
         "mu_s": 0.2268,
         "amplitude": 5.589,

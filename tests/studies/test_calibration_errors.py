@@ -89,8 +89,7 @@ def covariance_of(
     slopes = np.column_stack([by_decay, by_excess])
     samples = np.flatnonzero(counts)
     errors = NOISE**2 * colour ** np.abs(np.subtract.outer(samples, samples))
-    covariance: np.ndarray = np.linalg.inv(slopes.T @ np.linalg.solve(errors, slopes))
-    return covariance
+    return np.asarray(np.linalg.inv(slopes.T @ np.linalg.solve(errors, slopes)))
 
 
 @pytest.fixture(scope="module")

@@ -355,7 +355,9 @@ def _report(
     said += contradictions
     if (results["validity"] & variables.Validity.NOT_RECOUPLED).any():
         said.append(
-            "The computed block does not come to rest before the next slide begins (flag not_recoupled)."
+            "The computed block does not come to rest before the next slide begins (flag "
+            "not_recoupled). Small errors of the table's motion may then change the motion much: the "
+            "intervals may be too narrow."
         )
     if constant is not None and not clipped:
         tables = _newmark_tables(found.observations[0], constant)

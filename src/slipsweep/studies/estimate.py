@@ -62,6 +62,11 @@ _APART = 0.004
 _HOPELESS = 60.0
 _SEVERAL = 0.02
 
+#: Fall of the sum of squares as the residuals are linearised anew, with which they are not linear,
+#: and how many times at most an end of the interval of Üy is followed so.
+_NOT_LINEAR = 0.5
+_TURNS = 3
+
 
 class Scale:
     """Scaled parameters of the search, a point, and Üy, λ, Δμ.
@@ -83,7 +88,7 @@ class Scale:
 
     def point(self, onset: float, decay: float, excess: float) -> Floats:
         """Return a point with offset and drift of the table where the search begins."""
-        return np.clip([onset, decay, excess, *self.first_lines], self.least, self.most)
+        return np.asarray(np.clip([onset, decay, excess, *self.first_lines], self.least, self.most))
 
     def parameters(self, point: Floats) -> Floats:
         """Return Üy, λ and Δμ."""
@@ -202,6 +207,19 @@ class Search:
 
     def allowed(self) -> list[Tried]:
         return [one for one in self.tried if self.above(one) <= SQUARE]
+
+    def outermost(self, side: int) -> Floats:
+        """Return the allowed point of least (`side` −1) or largest (1) Üy."""
+        return max((one.point for one in self.allowed()), key=lambda point: side * point[0])
+
+    def least_tried(self) -> float:
+        """Return the least sum of squares of the points that were tried here."""
+        return min(one.square for one in self.tried)
+
+    def adopt(self, other: "Search") -> None:
+        """Compare with the least of each branch that another search has found, too."""
+        for branch, square in other._least.items():
+            self._least[branch] = min(square, self._least.get(branch, math.inf))
 
     def leaders(self) -> list[Floats]:
         """The best point of each reading, the best of all first."""
@@ -419,11 +437,11 @@ def estimate(observations: Sequence[Observation]) -> Estimate:
         )
     width = QUANTILE * np.sqrt(np.diag(_covariance(search.slopes(search.best))))
     intervals = search.intervals(np.where(np.isfinite(width), np.clip(width, 1e-5, 0.3), 0.1))
+    intervals, allowed = _linearised_anew(search, intervals, observations, scale)
     intervals[0] = _beyond_mode_limit(intervals[0], search.best, observations, scale)
     low, high = (scale.parameters(ends) for ends in intervals.T)
     low = np.where(intervals[:, 0] == LEAST, 0.0, low)
     high = np.where(intervals[:, 1] == MOST, np.inf, high)
-    allowed = search.allowed()
     best = scale.parameters(search.best)
     # half an interval is no more than half of the value, of Δμ 0.3 of μs + Δμ
     widest = 2.0 * np.array([0.5, 0.5, 0.3]) * np.abs(best + np.array([0.0, 0.0, scale.mu_s]))
@@ -454,6 +472,66 @@ def estimate(observations: Sequence[Observation]) -> Estimate:
     )
 
 
+def _linearised_anew(
+    search: Search, intervals: Floats, observations: Sequence[Observation], scale: Scale
+) -> tuple[Floats, list[Tried]]:
+    """Return intervals wide enough for what is far from the best, and all points allowed.
+
+    The residuals depend on errors of the table's motion linearly only near the point at which they
+    were linearised.  Far from it, at the ends of the interval of Üy and at the best of other
+    branches, they are linearised once more, with the motion of the table that is likely there.
+    """
+    best = search.best
+    others = [
+        point
+        for point in search.leaders()[1:]
+        if search.square(point) < search.least + _HOPELESS
+        and not math.isfinite(search.above(search.at(point)))
+    ]
+    starts = [(search.outermost(-1), -1, _TURNS), (search.outermost(1), 1, _TURNS)]
+    starts += [(point, 1, 1) for point in others]
+    base = [one.wrong for one in observations]
+    allowed = search.allowed()
+    for start, side, turns in starts:
+        _linearise(observations, scale, best, base)
+        before = search
+        point = start
+        for _ in range(turns):
+            square = before.square(point)
+            _linearise(observations, scale, point, _likely_motions(scale, observations, point))
+            near = _search_at(scale, observations)
+            near.adopt(search)
+            near.polish(point, free=range(1, point.size))
+            if near.least_tried() > square - _NOT_LINEAR or not near.allowed():
+                break
+            ends = near.intervals(np.clip(0.1 * np.ptp(intervals, axis=1), 1e-5, 0.3))
+            allowed += near.allowed()
+            every = np.column_stack([intervals, ends])
+            intervals = np.column_stack([every.min(axis=1), every.max(axis=1)])
+            before = near
+            point = near.outermost(side)
+    _linearise(observations, scale, best, base)
+    return intervals, allowed
+
+
+def _linearise(
+    observations: Sequence[Observation], scale: Scale, point: Floats, motions: Sequence[Floats]
+) -> None:
+    """Linearise residuals near a point, with these errors of the table's motion."""
+    for number, (one, wrong) in enumerate(zip(observations, motions, strict=True)):
+        one.wrong = wrong
+        one.linearize(scale.of_test(point, number))
+
+
+def _likely_motions(
+    scale: Scale, observations: Sequence[Observation], point: Floats
+) -> list[Floats]:
+    """Return the most likely errors of the table's motion of each test at a point."""
+    return [
+        one.likely_motion(scale.of_test(point, number)) for number, one in enumerate(observations)
+    ]
+
+
 def _errors(deviations: Floats, low: Floats, high: Floats) -> Floats:
     """Return standard errors: of the linear fit, or of the interval if that tells another story.
 
@@ -476,6 +554,11 @@ def _search(
     """Return a search by the likelihoods near a point."""
     for number, one in enumerate(observations):
         one.linearize(scale.of_test(near, number), rough)
+    return _search_at(scale, observations)
+
+
+def _search_at(scale: Scale, observations: Sequence[Observation]) -> Search:
+    """Return a search by the likelihoods as they are linearised."""
 
     def residuals(point: Floats) -> Floats:
         rests = [one.residuals(scale.of_test(point, at)) for at, one in enumerate(observations)]
@@ -588,9 +671,10 @@ def _beyond_mode_limit(
 def cycle_estimate(
     of_cycle: Callable[[Floats], Floats], parameters: Floats, free: list[int]
 ) -> tuple[Floats, Floats]:
-    """Return Üy, λ, Δμ and standard errors from the samples of one cycle; NaN of what these do not determine.
+    """Return Üy, λ, Δμ and standard errors from the samples of one cycle.
 
-    `of_cycle` are the residuals of these samples; `parameters` are those of the whole test, from which the search begins.
+    Those that the samples do not determine are NaN.  `of_cycle` are the residuals of these samples;
+    `parameters` are those of the whole test, from which the search begins.
     """
     start = parameters[free]
 

@@ -241,7 +241,10 @@ class Observation:
         return histories
 
     def _scaled(self, series: Mapping[str, Floats]) -> Floats:
-        """Return the samples that count, channel by channel, in standard deviations; 0 of a channel that is not there."""
+        """Return the samples that count, channel by channel, in standard deviations.
+
+        They are 0 of a channel that is not there.
+        """
         none = np.zeros(self.test.times.size)
         weighted: Floats = (
             np.array([series.get(name, none) for name in self.channels])[self._counted]
@@ -315,7 +318,8 @@ class Observation:
         high = near.max(axis=0)
         measured = self._without_lines("block_acceleration")[self._jumps]
         beyond = (measured - np.clip(measured, low, high)) * self._jump_scale
-        return np.nan_to_num(np.sign(beyond) * np.maximum(np.abs(beyond) - _NOISE, 0.0), nan=1e3)
+        sizes = np.maximum(np.abs(beyond) - _NOISE, 0.0)
+        return np.asarray(np.nan_to_num(np.sign(beyond) * sizes, nan=1e3))
 
     def _without_lines(self, name: str) -> Floats:
         """Return a channel of the block less what its offset, drift and steps add."""
@@ -325,6 +329,10 @@ class Observation:
         """Return the most likely errors of the table's motion, then sizes of `lines`, and their standard deviations."""
         rest = self._rest(self.forward(parameters, self.test.times))
         return self.linear.most_likely(whitened(rest, self._links))
+
+    def likely_motion(self, parameters: Floats) -> Floats:
+        """Return the most likely errors of the table's motion, in standard deviations."""
+        return self.nuisances(parameters)[0][: self.wrong.size]
 
     def _unexplained(self, parameters: Floats) -> list[Floats]:
         """Return what nothing explains of the samples of each channel, in standard deviations."""
