@@ -40,11 +40,9 @@ SLIDING: dict[str, Any] = {
 DRAWN = [
     ("eq4", 0),
     ("eq4", 1),
-    ("yield", 0),
     ("continuous", 0),
     ("continuous", 1),
     ("continuous", 2),
-    ("continuous", 3),
 ]
 
 
@@ -60,7 +58,8 @@ def of_block(history: xr.Dataset, errors: np.ndarray) -> xr.Dataset:
 
 
 def white(history: xr.Dataset, seed: int) -> np.ndarray:
-    return NOISE * np.random.default_rng(seed).standard_normal(history.time.size)
+    standard = np.random.default_rng(seed).standard_normal(history.time.size)
+    return NOISE * np.asarray(standard)
 
 
 def covariance_of(
@@ -176,7 +175,7 @@ def test_noise_is_estimated_with_the_degrees_of_freedom_that_are_left() -> None:
 
 
 def test_intervals_hold_the_truth_and_estimates_scatter_as_their_errors_say() -> None:
-    """Of 21 intervals at 95 % four or more miss in 2 % of all such draws; these seeds are fixed.
+    """Of 15 intervals at 95 % three or more miss in 4 % of all such draws; these seeds are fixed.
 
     The squares of estimates that are determined, in standard errors, have a mean of 1.
     """
@@ -191,7 +190,7 @@ def test_intervals_hold_the_truth_and_estimates_scatter_as_their_errors_say() ->
             missed += not low <= case[name] <= high
             off = (found[name].item() - case[name]) / found[f"{name}_error"].item()
             squares.append(off**2)
-    assert missed <= 3
-    # of 15 squares 99 % of all draws have a mean in this range
-    assert np.sum(np.isfinite(squares)) >= 15
-    assert 0.31 < np.nanmean(squares) < 2.19
+    assert missed <= 2
+    # of 12 squares 99 % of all draws have a mean in this range
+    assert np.sum(np.isfinite(squares)) >= 12
+    assert 0.25 < np.nanmean(squares) < 2.36

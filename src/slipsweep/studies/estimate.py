@@ -62,10 +62,12 @@ _APART = 0.004
 _HOPELESS = 60.0
 _SEVERAL = 0.02
 
-#: Fall of the sum of squares as the residuals are linearised anew, with which they are not linear,
-#: and how many times at most an end of the interval of Üy is followed so.
-_NOT_LINEAR = 0.5
+#: Fall of the sum of squares as the residuals are linearised anew, with which they are not linear;
+#: how many times at most an end of the interval of Üy is followed so; rise of the least of a branch
+#: up to which it may be refuted wrongly.
+_NOT_LINEAR = 1.0
 _TURNS = 3
+_NARROWLY = 20.0
 
 
 class Scale:
@@ -211,6 +213,15 @@ class Search:
     def outermost(self, side: int) -> Floats:
         """Return the allowed point of least (`side` −1) or largest (1) Üy."""
         return max((one.point for one in self.allowed()), key=lambda point: side * point[0])
+
+    def refuted_narrowly(self) -> list[Floats]:
+        """Return the best points of readings that are refuted, but narrowly."""
+        return [
+            point
+            for point in self.leaders()
+            if self.square(point) < self.least + _NARROWLY
+            and not math.isfinite(self.above(self.at(point)))
+        ]
 
     def least_tried(self) -> float:
         """Return the least sum of squares of the points that were tried here."""
@@ -454,7 +465,7 @@ def estimate(observations: Sequence[Observation]) -> Estimate:
     # no correlation with a parameter that only samples beside jumps bound
     correlation = np.nan_to_num(covariance / np.outer(deviations, deviations))
     np.fill_diagonal(correlation, 1.0)
-    errors = _errors(deviations[:3], low, high)
+    errors = _errors(deviations[:3], best, low, high)
     return Estimate(
         best,
         np.where(determined, errors, np.nan),
@@ -482,36 +493,40 @@ def _linearised_anew(
     branches, they are linearised once more, with the motion of the table that is likely there.
     """
     best = search.best
-    others = [
-        point
-        for point in search.leaders()[1:]
-        if search.square(point) < search.least + _HOPELESS
-        and not math.isfinite(search.above(search.at(point)))
-    ]
-    starts = [(search.outermost(-1), -1, _TURNS), (search.outermost(1), 1, _TURNS)]
-    starts += [(point, 1, 1) for point in others]
     base = [one.wrong for one in observations]
+    every = [np.transpose(intervals)]
     allowed = search.allowed()
-    for start, side, turns in starts:
+
+    def near(before: Search, point: Floats) -> Search | None:
+        """Return a search linearised at a point; None if that changes little."""
+        square = before.square(point)
+        _linearise(observations, scale, point, _likely_motions(scale, observations, point))
+        after = _search_at(scale, observations)
+        after.adopt(search)
+        after.polish(point, free=range(1, point.size), most=6)
+        changes = after.least_tried() < square - _NOT_LINEAR
+        return after if changes and after.allowed() else None
+
+    width = float(np.clip(0.1 * np.ptp(intervals[0]), 1e-5, 0.3))
+    for side in (-1, 1):
         _linearise(observations, scale, best, base)
         before = search
-        point = start
-        for _ in range(turns):
-            square = before.square(point)
-            _linearise(observations, scale, point, _likely_motions(scale, observations, point))
-            near = _search_at(scale, observations)
-            near.adopt(search)
-            near.polish(point, free=range(1, point.size))
-            if near.least_tried() > square - _NOT_LINEAR or not near.allowed():
+        for _ in range(_TURNS):
+            after = near(before, before.outermost(side))
+            if after is None:
                 break
-            ends = near.intervals(np.clip(0.1 * np.ptp(intervals, axis=1), 1e-5, 0.3))
-            allowed += near.allowed()
-            every = np.column_stack([intervals, ends])
-            intervals = np.column_stack([every.min(axis=1), every.max(axis=1)])
-            before = near
-            point = near.outermost(side)
+            after.end(0, side, width)
+            allowed += after.allowed()
+            before = after
+    for point in search.refuted_narrowly():
+        _linearise(observations, scale, best, base)
+        after = near(search, point)
+        if after is not None:
+            every.append(np.transpose(after.intervals(np.full(3, 0.05))))
+            allowed += after.allowed()
     _linearise(observations, scale, best, base)
-    return intervals, allowed
+    points = np.vstack([*every, [one.point[:3] for one in allowed]])
+    return np.column_stack([points.min(axis=0), points.max(axis=0)]), allowed
 
 
 def _linearise(
@@ -532,14 +547,16 @@ def _likely_motions(
     ]
 
 
-def _errors(deviations: Floats, low: Floats, high: Floats) -> Floats:
+def _errors(deviations: Floats, best: Floats, low: Floats, high: Floats) -> Floats:
     """Return standard errors: of the linear fit, or of the interval if that tells another story.
 
-    It does where the sum of squares is flat in a parameter, or has several minima.
+    It does where the sum of squares is flat in a parameter, or has several minima; then the longer
+    side of the interval counts.
     """
     of_interval = (high - low) / (2.0 * QUANTILE)
     agree = (deviations < 2.0 * of_interval) & (of_interval < 2.0 * deviations)
-    return np.where(agree | ~np.isfinite(of_interval), deviations, of_interval)
+    longer = np.maximum(high - best, best - low) / QUANTILE
+    return np.where(agree | ~np.isfinite(of_interval), deviations, longer)
 
 
 def _solutions(scale: Scale, points: Sequence[Floats], number: int) -> tuple[Floats, list[Floats]]:
