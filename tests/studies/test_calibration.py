@@ -203,12 +203,12 @@ def test_offsets_in_all_channels_are_fitted(clean: dict[str, xr.Dataset]) -> Non
 
 
 def test_a_table_channel_that_is_cut_off_is_named(clean: dict[str, xr.Dataset]) -> None:
-    test = measured(clean["stick_slip"], seed=5, noise=0.005)
+    test = measured(clean["stick_slip"], 5, 0.01, responses=["block_acceleration"])
     table = test.ground_acceleration.values
-    table[:] = np.minimum(table, 4.2)
+    table[:] = np.minimum(table, 4.8)
     found = calibrated(test)
     first, second, *_ = found.attrs["findings"].splitlines()
-    assert first.startswith("ground_acceleration is cut off: it is flat at 4.2 m s-2, ")
+    assert first.startswith("ground_acceleration is cut off: it is flat at 4.8 m s-2, ")
     assert second == "The intervals do not include what is cut off. Test with a larger range."
     assert found.attrs["model_table"].startswith("# WARNING: not ready for use.\n# ground_acc")
     assert found.attrs["uncertainty_table"] == ""
@@ -233,7 +233,8 @@ def test_a_crest_is_told_from_a_flat_top(noise: float, bits: int | None) -> None
 
 @pytest.mark.parametrize("kinetic", [0.38, 0.25])
 def test_coulombs_block_is_newmarks(kinetic: float) -> None:
-    found = slipsweep.calibrate(coulomb(kinetic), 6.0, 0.38, cycles=False)
+    test = coulomb(kinetic).isel(time=slice(None, None, 2))
+    found = slipsweep.calibrate(test, 6.0, 0.38, cycles=False)
     first = found.attrs["findings"].splitlines()[0]
     assert first.startswith("This is a block of constant friction: by statics ")
     assert first == found.attrs["constant_friction"]

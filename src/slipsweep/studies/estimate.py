@@ -462,7 +462,7 @@ def estimate(observations: Sequence[Observation]) -> Estimate:
     slopes = scale.slopes(search.best)
     covariance = _covariance(search.slopes(search.best)) * np.outer(slopes, slopes)
     deviations = np.sqrt(np.diag(covariance))
-    # no correlation with a parameter that only samples beside jumps bound
+    # no correlation with a parameter that no residual depends on near the best
     correlation = np.nan_to_num(covariance / np.outer(deviations, deviations))
     np.fill_diagonal(correlation, 1.0)
     errors = _errors(deviations[:3], best, low, high)

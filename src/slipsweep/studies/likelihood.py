@@ -67,11 +67,9 @@ _NO_MISFIT = 0.01
 #: Steps of the derivatives by errors of the table's motion, in standard deviations.
 _STEP = 0.3
 
-#: Intervals of sampling to either side of a jump, and standard deviations of the noise, within which
-#: a sample may be on either side of it; consecutive samples, and standard deviations of the noise,
-#: by which a block slips upslope.
+#: Intervals of sampling to either side of a jump that are left out; consecutive samples, and
+#: standard deviations of the noise, by which a block slips upslope.
 _BESIDE_A_JUMP = 1.6
-_NOISE = 3.0
 _UPSLOPE_SAMPLES = 4
 _UPSLOPE_NOISE = 5.0
 
@@ -192,7 +190,6 @@ class Observation:
         self.first_sizes = np.array([mean, 0.0])[: len(self.table_lines)]
         self.wrong = np.zeros(self.motion.errors.shape[1])
         self.table_factor = 1.0
-        self._jumps = np.zeros(0, dtype=np.int64)
         self._of_sensors = {name: np.zeros(test.times.size) for name in self.channels}
         self.peak = self.peak_of(self.first_sizes)
         self.upslope: list[float] = []
@@ -282,44 +279,16 @@ class Observation:
             self._effects[:, at] = self._scaled({line.channel: line.values})
         self._measured = self._scaled(self.test.channels) + self._effects[:, :number] @ self.wrong
         self.linear = Linear(whitened(self._effects, self._links))
-        if "block_acceleration" in self.channels:
-            row = self.channels.index("block_acceleration")
-            self._jumps = np.flatnonzero(self._beside_jumps[row] & self._use[row])
-            self._jump_scale = self._weights[row][self._jumps] / noise[row]
 
     def residuals(self, parameters: Floats) -> Floats:
-        """Return independent residuals of unit variance, if the model and the noise are right.
-
-        The last of them are samples beside jumps of the block's acceleration.
-        """
-        history = self.forward(parameters, self.test.times)
-        rest = self._rest(history)
-        independent = self.linear.independent(whitened(rest, self._links))
-        return np.concatenate([independent, self._beyond_jumps(history)])
+        """Return independent residuals of unit variance, if the model and the noise are right."""
+        rest = self._rest(self.forward(parameters, self.test.times))
+        return self.linear.independent(whitened(rest, self._links))
 
     def _rest(self, history: Mapping[str, Floats]) -> Floats:
         """Return measured less computed samples that count, in standard deviations."""
         rest = self._measured - self._scaled(history)
         return np.nan_to_num(rest, nan=1e3, posinf=1e3, neginf=1e3)
-
-    def _beyond_jumps(self, history: Mapping[str, Floats]) -> Floats:
-        """Return how far samples beside jumps lie beyond what is computed shortly before and after them.
-
-        They tell on which side of a jump they are, which a small error in its time would change.
-        What may be noise counts for nothing: it would widen what is computed.
-        """
-        if not self._jumps.size:
-            return np.zeros(0)
-        block = np.pad(history["block_acceleration"], 2, mode="edge")
-        before, last, same, first, after = (block[self._jumps + shift] for shift in range(5))
-        # by a straight line from either side, too, where the sample is on the other one
-        near = np.array([last, same, first, 2.0 * last - before, 2.0 * first - after])
-        low = near.min(axis=0)
-        high = near.max(axis=0)
-        measured = self._without_lines("block_acceleration")[self._jumps]
-        beyond = (measured - np.clip(measured, low, high)) * self._jump_scale
-        sizes = np.maximum(np.abs(beyond) - _NOISE, 0.0)
-        return np.asarray(np.nan_to_num(np.sign(beyond) * sizes, nan=1e3))
 
     def _without_lines(self, name: str) -> Floats:
         """Return a channel of the block less what its offset, drift and steps add."""
@@ -350,21 +319,15 @@ class Observation:
 
         The noise is measured by the median, so that these samples have no part in it.
         """
-        history = self.forward(parameters, self.test.times)
         rests = zip(self._unexplained(parameters), self._by_channel(self._scale), strict=True)
         beyond = {}
         for at, (rest, scale) in enumerate(rests):
             times = self.test.times[self._counted[at]]
             off = np.abs(rest / scale)
             noise = _OF_MEDIAN * float(np.median(off))
-            if self.channels[at] == "block_acceleration" and self._jumps.size:
-                # these are less `_NOISE`
-                beside = np.abs(self._beyond_jumps(history)) / self._jump_scale
-                times = np.append(times, self.test.times[self._jumps])
-                off = np.append(off, beside + _NOISE * noise * (beside > 0.0))
             contradicts = off > max(_NO_NOISE * noise, _NO_MISFIT * self.largest[at])
             if contradicts.any():
-                beyond[self.channels[at]] = (np.sort(times[contradicts]), float(off.max()))
+                beyond[self.channels[at]] = (times[contradicts], float(off.max()))
         return beyond
 
     def noise_seen(self, parameters: Floats) -> list[float]:
