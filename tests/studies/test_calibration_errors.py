@@ -1,4 +1,4 @@
-"""Errors and intervals of calibrations against closed forms: the information of samples of one channel.
+"""Errors and intervals of calibrations against closed forms, by the information in samples.
 
 The table is exact and only the block's acceleration is measured, so that the information of each
 sample is a derivative of Eq. 4, written out here.
@@ -136,7 +136,7 @@ def test_errors_of_a_cycle_are_those_of_the_information_in_its_samples(
 def test_errors_under_coloured_noise_are_those_of_generalised_least_squares(
     sliding: xr.Dataset,
 ) -> None:
-    """Noise of which neighbours have the correlation 0.9; taken as white, λ would be half as uncertain."""
+    """Neighbours have the correlation 0.9; taken as white, λ would be half as uncertain."""
     samples = sliding.time.size
     errors = NOISE * coloured(samples, 0.9, seed=2)
     found = calibrate(of_block(sliding, errors), 6.0, 0.38, cycles=False)
@@ -150,7 +150,7 @@ def test_errors_under_coloured_noise_are_those_of_generalised_least_squares(
 
 
 def test_noise_is_estimated_with_the_degrees_of_freedom_that_are_left() -> None:
-    """Of a block at rest on the table a sixth of the scatter is explained by errors of the table's motion."""
+    """Of a block at rest the table's errors explain a sixth of the scatter."""
     times = np.arange(80) / 100.0
     table = 3.0 * np.sin(2.0 * np.pi * 2.5 * times)
     at_rest = np.array([50.0, 2.0, 0.0])  # Üy is far above

@@ -490,8 +490,9 @@ def _misfit(found: Estimate, with_drift: Callable[[str], Estimate]) -> list[str]
         return []
     listed = ", ".join(f"{name} {times:.2g} times" for name, times in misfits.items())
     said = [
-        f"The misfit is larger than the noise of the sensors: {listed}. The block did not move as in the model, "
-        "a sensor drifts, or its noise is slow: do not use the parameters before you know why (see the figure)."
+        f"The misfit is larger than the noise of the sensors: {listed}. The block did not move as in "
+        "the model, a sensor drifts, or its noise is slow: do not use the parameters before you know "
+        "why (see the figure)."
     ]
     for name in RESPONSES:
         may_drift = all(

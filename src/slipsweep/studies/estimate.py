@@ -269,7 +269,7 @@ class Search:
         self.minima.append(min(self.tried[first:], key=lambda one: one.square))
 
     def candidates(self) -> list[Floats]:
-        """Return the best point of each reading, and minima apart from these, the best of all first."""
+        """Return the best point of each reading, the best of all first, and other minima."""
         points = self.leaders()[:_MINIMA]
         for minimum in sorted(self.minima, key=lambda one: one.square):
             near = min(abs(minimum.point[0] - point[0]) for point in points)
@@ -278,7 +278,10 @@ class Search:
         return points
 
     def apart(self) -> list[float]:
-        """Return Üy, in parts of the peak, of minima that the data allow with values between that they do not."""
+        """Return Üy of minima that the data allow with values between that they do not.
+
+        It is in parts of the peak.
+        """
         minima = sorted(self.candidates(), key=lambda point: point[0])
         allowed = [point for point in minima if self.above(self.at(point)) <= SQUARE]
         onsets: list[float] = []
@@ -590,7 +593,10 @@ def _search_at(scale: Scale, observations: Sequence[Observation]) -> Search:
 
 
 def _first_minima(observations: Sequence[Observation], scale: Scale) -> list[Floats]:
-    """Return minima, the best first, of ever less noise, so that no sample counts for much at first."""
+    """Return minima, the best first.
+
+    They are those of ever less noise, so that no sample counts for much at first.
+    """
     largest = [noise for one in observations for noise in one.sensor_noise / one.largest]
     points = _rough_minima(observations, scale)
     for stage in _STAGES[1:]:
@@ -630,9 +636,9 @@ def _rough_minima(observations: Sequence[Observation], scale: Scale) -> list[Flo
 
 
 def _look_along_onset(search: Search) -> None:
-    """Follow the minima along Üy: two values of it can give the same velocity, of which one is right.
+    """Follow the minima along Üy.
 
-    In continuous sliding Üy and the acceleration at which the block would begin to slide as late by
+    Two values of it can give the same velocity, of which one is right.  In continuous sliding Üy and the acceleration at which the block would begin to slide as late by
     Eq. 4 do so, if the table's acceleration crosses Eq. 4 between the two.
     """
     best = search.best

@@ -84,9 +84,9 @@ class Line(NamedTuple):
 
 
 class Linear:
-    """Errors that residuals depend on linearly, `effects` being those of one standard deviation of each.
+    """Errors that residuals depend on linearly.
 
-    Residuals are in standard deviations, one a row of `effects`.
+    `effects` are those of one standard deviation of each.  Residuals are in standard deviations, one a row of `effects`.
     """
 
     def __init__(self, effects: Floats) -> None:
@@ -99,11 +99,14 @@ class Linear:
         self._shrunk = self.left * (1.0 - 1.0 / np.sqrt(1.0 + self.sizes**2))
 
     def independent(self, residuals: Floats) -> Floats:
-        """Return residuals that are independent and of unit variance, if the model and the noise are right."""
+        """Return residuals made independent, of unit variance if model and noise are right."""
         return np.asarray(residuals - self._shrunk @ (self.left.T @ residuals))
 
     def most_likely(self, residuals: Floats) -> tuple[Floats, Floats]:
-        """Return the most likely values of the errors and their standard deviations, in those of their priors."""
+        """Return the most likely values of the errors and their standard deviations.
+
+        Both are in standard deviations of their priors.
+        """
         along = self.left.T @ residuals
         values = self.right.T @ (self.sizes / (1.0 + self.sizes**2) * along)
         spread = 1.0 - np.sum(self.right**2 * self.known[:, None], axis=0)
@@ -195,7 +198,10 @@ class Observation:
         self.upslope: list[float] = []
 
     def table_acceleration(self, sizes: Floats) -> Floats:
-        """Return the table's acceleration at the points of `motion`, less offset and drift of these sizes."""
+        """Return the table's acceleration at the points of `motion`.
+
+        It is less offset and drift of these sizes.
+        """
         return np.asarray(self.motion.with_errors(self.wrong) - self._table_lines @ sizes)
 
     def recorded_acceleration(self, sizes: Floats) -> Floats:
@@ -295,7 +301,10 @@ class Observation:
         return np.asarray(self.test.channels[name] - self._of_sensors[name])
 
     def nuisances(self, parameters: Floats) -> tuple[Floats, Floats]:
-        """Return the most likely errors of the table's motion, then sizes of `lines`, and their standard deviations."""
+        """Return the most likely errors of the table's motion and sizes of `lines`.
+
+        The second array has their standard deviations.
+        """
         rest = self._rest(self.forward(parameters, self.test.times))
         return self.linear.most_likely(whitened(rest, self._links))
 

@@ -1,4 +1,4 @@
-"""Noise of sensors: its size, the steps of converters, its colour, and channels at the end of their range.
+"""Noise of sensors: its size, steps of converters, its colour, channels that are cut off.
 
 Coloured noise is taken as noise of first order (an autoregressive process): errors of samples at
 the distance Δt have the correlation ρ^(Δt/h), with ρ of neighbours and h the interval of sampling.
@@ -57,7 +57,10 @@ def converter_noise(values: Floats) -> float:
 
 
 def distances(times: Floats) -> Floats:
-    """Return the distance of each sample to the one before, in intervals of sampling; inf of the first."""
+    """Return the distance of each sample to the one before; inf of the first.
+
+    The unit is the interval of sampling.
+    """
     intervals = np.diff(times)
     return np.append(np.inf, intervals / np.median(intervals))
 
@@ -134,7 +137,7 @@ def is_first_order(innovations: Floats) -> bool:
 
 
 def flat_top(values: Floats) -> int:
-    """Return how many samples of a clipped channel lie at the end of its range, its largest value; else 0.
+    """Return how many samples of a clipped channel lie at its largest value; else 0.
 
     The crest of a motion is a parabola, which has five times as many samples within 25 steps of a
     converter as within one.  A clipped crest has few beside its flat top.

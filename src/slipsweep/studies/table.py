@@ -1,4 +1,4 @@
-"""The motion of a table behind the record of its acceleration: a spline, and the errors that it may have.
+"""The motion of a table behind the record of its acceleration: a spline, and its errors.
 
 The spline, its knots and the colour of the noise are those of the best Akaike criterion; why it is a
 spline, and why its knots are closer than the criterion says: docs/calibration.md.
@@ -214,9 +214,9 @@ def _colour_at_rest(times: Floats, values: Floats, at_rest: NDArray[np.bool_]) -
 
 
 def _colour(times: Floats, values: Floats, kinks: Sequence[_Kink]) -> float:
-    """Return the correlation of neighbouring samples of the noise, of largest likelihood; 0 if that may be chance.
+    """Return the correlation of neighbouring samples of the noise, of largest likelihood.
 
-    Criteria for the number of knots would follow coloured noise.  So the motion is taken as a
+    It is 0 if that may be chance.  Criteria for the number of knots would follow coloured noise.  So the motion is taken as a
     process here, a spline whose third derivatives are independent between knots, and the
     likelihood of the samples, with its coefficients integrated out, is that of mixed linear models
     (restricted maximum likelihood): its size is sought with the colour and size of the noise.
@@ -310,7 +310,7 @@ def _knots(times: Floats, spacing: int) -> Floats:
 def _with_kinks(
     record: _Record, best: _Fitted
 ) -> tuple[_Fitted, list[tuple[_Kink, list[_Fitted]]]]:
-    """Return the spline with a kink where the shaking begins, and one where it ends, if these improve it.
+    """Return the spline with kinks where the shaking begins and ends, if these improve it.
 
     Beside it the kinks, and for each the splines with the kink at this and other places that are
     likely.
