@@ -22,6 +22,7 @@ USES: dict[str, list[str]] = {
     "a time history": ["history"],
     "a record, then a waveform, then a time history": ["record", "triangle", "history"],
     "Newmark's block under a record": ["newmark"],
+    "Newmark's block both ways under a record": ["both ways"],
     "a sine by steps": ["steps"],
 }
 
@@ -50,6 +51,9 @@ uses = {
     "record": lambda: slipsweep.sweep(**block, excitation=record),
     "history": lambda: slipsweep.simulate(**block, **wave),
     "newmark": lambda: slipsweep.sweep(**block, excitation=record, model="newmark"),
+    "both ways": lambda: slipsweep.sweep(
+        **block, excitation=record, model=slipsweep.Newmark(sliding="both")
+    ),
     "steps": lambda: slipsweep.sweep(**block, **wave, solver="step"),
 }
 started = time.process_time()

@@ -1,9 +1,8 @@
-"""Newmark's block on the ground motions that pySLAMMER ships: agreement, and the time of a million analyses.
+"""Newmark's block on the ground motions that pySLAMMER ships: agreement with other programs.
 
-Agreement: every motion at ky = 0.1 g, against pySLAMMER's RigidAnalysis on the motion as it is and
+Every motion at ky = 0.1 g, against pySLAMMER's RigidAnalysis on the motion as it is and
 on the same straight lines sampled 4 and 16 times as finely, and against pyNewmarkDisp, as it is and
-with Newmark's braking put into its rule.  Time: a million (ky, motion, scale) analyses by
-slipsweep; the paper's law, and pySLAMMER, on a share of them. Writes records.md.
+with Newmark's braking put into its rule.  Writes records.md.
 
 ``--slammer FILE`` compares with SLAMMER 1.1 itself: the table of its results that pySLAMMER is
 verified against, tests/verification_data/reference/SLAMMER_results.xlsx in pySLAMMER's repository,
@@ -11,7 +10,6 @@ which its package does not have.
 """
 
 import argparse
-import time
 import warnings
 from pathlib import Path
 from typing import Any
@@ -19,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.machine import arguments, measured_on, number, table
-from slipsweep import Newmark, Record, Suite, sweep
+from slipsweep import Newmark, Record, sweep
 
 KY = 0.1
 
@@ -143,71 +141,6 @@ def comparison(found: dict[str, Any], runs: list[Run], g: float) -> str:
     )
 
 
-def timing(found: dict[str, Any], g: float, analyses: int, share: int) -> str:
-    """Processor time of `analyses` by slipsweep in one run, of a share of them by the paper's law and by pySLAMMER."""
-    from pyslammer import RigidAnalysis
-
-    suite = Suite(
-        tuple(Record.sampled(motion.accel * g, motion.dt) for motion in found.values()),
-        tuple(found),
-    )
-    samples = float(np.mean([motion.accel.size for motion in found.values()]))
-
-    def axes(wanted: int) -> tuple[np.ndarray, np.ndarray]:
-        count = max(round((wanted / len(found)) ** 0.5), 1)
-        return np.geomspace(0.02, 0.4, count), np.geomspace(0.3, 3.0, count)
-
-    def ours(wanted: int, model: str) -> tuple[int, float]:
-        onsets, scales = axes(wanted)
-        newmark = {"yield_coefficient": onsets}
-        mendez = {"theta": 0.0, "mu_s": 0.3, "yield_acceleration": onsets * g}
-        start = time.process_time()
-        result = sweep(
-            **(newmark if model == "newmark" else mendez),
-            excitation=suite,
-            scale=scales,
-            model=model,
-        )
-        return result.permanent_displacement.size, time.process_time() - start
-
-    def theirs() -> tuple[int, float]:
-        onsets, scales = axes(analyses)
-        rng = np.random.default_rng(1)
-        every = list(found.values())
-        start = time.process_time()
-        for index in range(share):
-            # every motion in turn, so that the share has the samples of the whole
-            RigidAnalysis(
-                rng.choice(onsets), every[index % len(every)], scale_factor=rng.choice(scales)
-            )
-        return share, time.process_time() - start
-
-    ours(1, "newmark"), ours(1, "mendez"), theirs()  # compiled, and loaded, before the clock starts
-    runs = {
-        "slipsweep, Newmark": ours(analyses, "newmark"),
-        "slipsweep, the paper's law": ours(analyses // 10, "mendez"),
-        "pySLAMMER's loop": min((theirs() for _ in range(3)), key=lambda run: run[1]),
-    }
-    each = {name: seconds / done for name, (done, seconds) in runs.items()}
-    ky, law, peer = each.values()
-    rows = []
-    for name, (done, seconds) in runs.items():
-        figures = [seconds, each[name], each[name] / samples, peer / each[name]]
-        rows.append([name, done, *map(number, figures)])
-    header = [
-        "",
-        "analyses",
-        "seconds",
-        "seconds an analysis",
-        "seconds a sample",
-        "times pySLAMMER's speed",
-    ]
-    return (
-        table(header, rows)
-        + f"\nThe paper's law takes {number(law / ky)} times as long as Newmark's block.\n"
-    )
-
-
 def main(given: argparse.Namespace) -> Path:
     """Measure, and write the page."""
     with warnings.catch_warnings():
@@ -229,9 +162,6 @@ def main(given: argparse.Namespace) -> Path:
         compared = "".join(
             f"**{name}.** {comparison(found, runs, G_EARTH)}\n" for name, runs in fits.items()
         )
-        times = timing(
-            found, G_EARTH, 100 if given.tiny else 1_000_000, 2 if given.tiny else 4 * len(found)
-        )
     page = given.folder / "records.md"
     page.write_text(
         "# Newmark's block on recorded motions\n\n"
@@ -249,11 +179,6 @@ def main(given: argparse.Namespace) -> Path:
         "refined.\nSLAMMER 1.1: its own results, which pySLAMMER is verified against; the motions scaled, and both "
         "ways.\n\n"
         f"{compared}"
-        "## Time of (ky, motion, scale) analyses\n\n"
-        "Processor time of all threads together: core for core. Motions, yield coefficients (0.02 to 0.4) and scales\n"
-        "(0.3 to 3) span the grid, solved in one run; seconds a sample count those of the motion, slid\n"
-        "over or not.\n\n"
-        f"{times}"
     )
     return Path(page)
 

@@ -18,6 +18,7 @@ WRITES = {
     "report": ["report.md"],
     "speed_vs_error": ["speed_vs_error.csv", "engines.md", "speed_vs_error.png"],
     "records": ["records.md"],
+    "record_times": ["record_times.md"],
     "large_sweeps": ["large_sweeps.md"],
     "faults": ["faults.md"],
     "calibration": ["calibration.md"],
@@ -25,6 +26,7 @@ WRITES = {
     "agreement": ["agreement.md"],
     "limits": ["limits.md"],
     "compiling": ["compiling.md"],
+    "both_ways": ["both_ways.md"],
 }
 
 #: Half a minute of processes, clusters and compilation.

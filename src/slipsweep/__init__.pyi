@@ -29,5 +29,7 @@ from .studies.hazard import displacement_hazard as displacement_hazard
 from .studies.history import simulate as simulate
 from .studies.limits import limit_amplitude as limit_amplitude
 from .studies.published_statistics import published_statistics as published_statistics
+from .studies.published_strength import published_strength as published_strength
+from .studies.strength import required_strength as required_strength
 from .studies.suite_statistics import suite_statistics as suite_statistics
 from .studies.uncertainty import sample as sample

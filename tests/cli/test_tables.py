@@ -315,3 +315,15 @@ def test_friction_has_every_slide(tmp_path: Path) -> None:
         low, high = found[f"{kind}_friction_interval"].values
         line = f"{kind + ' friction by statics':<28}{value:.3f}   95 %: {low:.3f} to {high:.3f}\n"
         assert line in text
+
+
+def test_a_threshold_of_slides_may_be_in_g_of_the_gravity_given(tmp_path: Path) -> None:
+    test = Path(__file__).parents[2] / "sweeps" / "data" / "shaking_test.csv"
+    block = ("--theta", "5", "--mu-s", "0.38", "--g", "9.7")
+    text = printed(tmp_path, "friction", test, *block, "--threshold", "0.1g")
+    found = slipsweep.measured_friction(test, 5.0, 0.38, g=9.7, threshold=0.97)
+    assert text.startswith("threshold  0.97 m/s2: given\n")
+    assert f"{found.sizes['slide']} slides, s and m/s2:\n" in text
+    _, rows = table(text, " onset ", found.sizes["slide"])
+    onsets = [numbers(words)[0] for words in rows]
+    np.testing.assert_allclose(onsets, found.slide_onset, rtol=6e-4)

@@ -181,8 +181,9 @@ def test_map_colours_are_the_dataset(opened: Any) -> None:
     shape, values = opened.execute_script(
         FOUND + "const d = found('colours').data.image[0]; return [d.shape, [...d]]"
     )
-    in_g, top = opened.execute_script(FOUND + "return [found('map_g').end, found('y_range').end]")
-    assert in_g * 9.81 == pytest.approx(top)
+    script = "return ['map_g', 'y_range'].map(found).map((one) => [one.start, one.end])"
+    in_g, ends = np.array(opened.execute_script(FOUND + script))
+    np.testing.assert_allclose(in_g * 9.81, ends, rtol=1e-12)
     seen = np.reshape(np.array(values, float), shape)  # from below
     mm = 1000 * sweep(5, 0.3, *AXES[2:], excitation=Sine(cycles=4)).permanent_displacement.values
     rows = ((np.arange(23) + 0.5) * seen.shape[0] / 23).astype(int)

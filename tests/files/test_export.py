@@ -376,6 +376,22 @@ def test_a_label_is_no_formula(tmp_path: Path) -> None:
     assert set(read(tmp_path / "t.csv").label) == {"mild ± slope, wet", "'=1+1"}
 
 
+@pytest.mark.parametrize("begins", ["=", "+", "-", "@", "\t"])
+def test_texts_that_a_spreadsheet_computes_are_quoted_in_csv(tmp_path: Path, begins: str) -> None:
+    """A number that begins with a minus is none of them."""
+    label = f"{begins}SUM(A1:A9)"
+    data = slipsweep.sweep(
+        xr.DataArray([5.0, 6.0], dims="case"), 0.4, [2.0, 4.0], 1.0, polarity=None
+    ).assign_coords(label=("case", [label, "plain"]), offset=("case", [-1.0, -2.0]))
+    data.to_netcdf(tmp_path / "a.nc")
+    export.export(tmp_path / "a.nc", tmp_path / "t.csv", variables=["sliding_mode"])
+    rows = (tmp_path / "t.csv").read_text().splitlines()
+    at = rows[0].split(",").index("label")
+    assert {row.split(",")[at] for row in rows[1:]} == {f"'{label}", "plain"}
+    at = rows[0].split(",").index("offset")
+    assert {row.split(",")[at] for row in rows[1:]} == {"-1.0", "-2.0"}
+
+
 def test_accelerations_in_g(folder: Path, tmp_path: Path) -> None:
     export.export(folder / "grid.nc", tmp_path / "t.csv", in_g=True)
     export.export(folder / "grid.nc", tmp_path / "u.csv")

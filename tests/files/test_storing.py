@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+import zarr
 
 import slipsweep
 from slipsweep.errors import InputError, RunError
@@ -117,6 +118,10 @@ def test_a_file_in_chunks_is_compressed(folder: Path, monkeypatch: pytest.Monkey
         xr.testing.assert_equal(one, other)
         assert (one.validity.encoding["zlib"], one.validity.encoding["complevel"]) == (True, 4)
         assert one.attrs["history"].endswith(" slipsweep run")
+    stored(sweep_job(spec.load(folder / "a.toml")), folder / "a.zarr")
+    group: Any = zarr.open_group(folder / "a.zarr", mode="r")
+    (codec,) = group["permanent_displacement"].compressors
+    assert codec.to_dict()["configuration"]["level"] == 4
 
 
 @pytest.mark.parametrize("output", ["a[1].nc", "a[1].zarr"])
@@ -190,6 +195,7 @@ def test_a_run_goes_on_with_other_memory_if_its_chunks_fit(
 ) -> None:
     """Chunks keep the size that the run was begun with; less memory than they take is refused."""
     monkeypatch.setattr(running, "_BASE_MEMORY", 0)
+    monkeypatch.setattr(running, "CHUNK_CELLS", 100)  # without a limit; else cells fill the memory
     cell = 2 * (8 + 8 + 1 + 2) + 8  # two copies of the default results, and 8 bytes
     (folder / "sweep.toml").write_text(WAVE.replace("num = 4", "num = 400"))
     path = folder / "a.nc"
@@ -211,10 +217,23 @@ def test_a_run_goes_on_with_other_memory_if_its_chunks_fit(
         stored(job_of(folder, "sweep"), path, resume=True, memory=1000 * cell)
     assert not stored(job_of(folder, "sweep"), path, resume=True, memory=7200 * cell).found
     assert marked == [2]
+    monkeypatch.undo()
     stored(job_of(folder, "sweep"), folder / "whole.nc")
     xr.testing.assert_identical(
         without_time(read_result(path)), without_time(read_result(folder / "whole.nc"))
     )
+
+
+@pytest.mark.parametrize("workers", [0, 1, 4])
+def test_chunks_on_the_way_from_workers_count_as_memory(folder: Path, workers: int) -> None:
+    """Of each worker one that is solved and two that wait, beside two here; never more than asked for."""
+    plan = job_of(folder, "sweep").plan
+    results = sum(np.dtype(dtype).itemsize for dtype in job_of(folder, "sweep").dtypes.values())
+    base = running._BASE_MEMORY + workers * running._WORKER_MEMORY
+    for memory in (base + 10**8, base + 10**9):
+        most = running._most_cells(plan, memory, workers)
+        taken = base + most * (2 + 3 * workers) * results
+        assert 0.7 * memory < taken + 8 * most <= memory
 
 
 def test_another_motion_is_another_run(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -331,6 +350,7 @@ EDITS: dict[str, Callable[[xr.Dataset], xr.Dataset]] = {
     "packed": packed,
     "transposed": lambda table: table.transpose(*reversed(table.permanent_displacement.dims)),
     "codes as numbers": lambda table: table.assign(sliding_mode=table.sliding_mode.astype(float)),
+    "flags as numbers": lambda table: table.assign(validity=table.validity.astype(float)),
     "single precision": lambda table: table.astype("float32", keep_attrs=True).assign(
         validity=table.validity
     ),
@@ -349,9 +369,8 @@ def test_what_other_programs_have_rewritten(folder: Path, edit: str) -> None:
         whole.permanent_displacement,
         atol=2e-5,
     )
-    np.testing.assert_array_equal(
-        again.sliding_mode.transpose(*whole.sliding_mode.dims), whole.sliding_mode
-    )
+    for name in ("sliding_mode", "validity"):
+        np.testing.assert_array_equal(again[name].transpose(*whole[name].dims), whole[name])
 
 
 def outer(table: xr.Dataset) -> xr.Dataset:

@@ -79,3 +79,15 @@ def test_flags_by_cf_xarray(result: xr.Dataset) -> None:
     for name, flag in result.validity.cf.flags.data_vars.items():
         np.testing.assert_array_equal(flag, own[name])
     assert "validity" in result.cf["permanent_displacement"].coords
+
+
+def test_flags_without_a_value_come_first_then_cautions_then_notes(result: xr.Dataset) -> None:
+    found = slipsweep.flags(result)
+    kinds = [one.attrs["kind"] for one in found.data_vars.values()]
+    order = ["no value", "caution", "note"]
+    assert kinds == sorted(kinds, key=order.index)
+    assert {*kinds} == {*order}
+    for name, one in found.data_vars.items():
+        flag = slipsweep.Validity[str(name).upper()]
+        assert one.attrs == {"long_name": flag.text, "kind": str(flag.kind)}
+    assert found.equals(result.slipsweep.flags())

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import registered
 from slipsweep.kernels import step
-from slipsweep.kernels.block import EQ12, LITERAL, NEWMARK, Motion, Options
+from slipsweep.kernels.block import EQ12, LITERAL, NEWMARK, Options
 from slipsweep.motion.cutting import path_of_waveform
 from slipsweep.motion.waveforms import Sine
 
@@ -29,51 +29,51 @@ RATE = 12.0
 
 
 @registered
-def falling(slide: step.Slide, ground: float, velocity: float) -> float:
+def falling(block: Any, ground: float, velocity: float, slip: float) -> Any:
     """Constantinou, Mokha and Reinhorn (1990), from μs down by `CHANGE` of it."""
-    return slide.mu_s * (1.0 - CHANGE * (1.0 - exp(-RATE * abs(velocity))))
+    return block.mu_s * (1.0 - CHANGE * (1.0 - exp(-RATE * abs(velocity))))
 
 
 @registered
-def rising(slide: step.Slide, ground: float, velocity: float) -> float:
+def rising(block: Any, ground: float, velocity: float, slip: float) -> Any:
     """The same, upwards."""
-    return slide.mu_s * (1.0 + CHANGE * (1.0 - exp(-RATE * abs(velocity))))
+    return block.mu_s * (1.0 + CHANGE * (1.0 - exp(-RATE * abs(velocity))))
 
 
 @registered
-def decaying_with_both(slide: step.Slide, ground: float, velocity: float) -> float:
+def decaying_with_both(block: Any, ground: float, velocity: float, slip: float) -> Any:
     """Eq. 6, which also falls with the velocity."""
-    decayed = (slide.mu_s + slide.delta_mu) * exp(-slide.decay_rate * abs(ground) / slide.g)
+    decayed = (block.mu_s + block.delta_mu) * exp(-block.decay_rate * abs(ground) / block.g)
     return decayed * (1.0 - CHANGE * (1.0 - exp(-RATE * abs(velocity))))
 
 
 @kernel
 def solve_falling(
-    cells: Any, options: Any, path: Any, blocks: Any, steps: Any, history: Any, results: Any
+    cells: Any, options: Any, path: Any, blocks: Any, steps: Any, log: Any, results: Any
 ) -> None:
     law = step.Law(falling, True, True)
-    step.solve_cells(law, cells, options, path, blocks, steps, history, results)
+    step.solve_cells(law, cells, options, path, blocks, steps, log, results)
 
 
 @kernel
 def solve_rising(
-    cells: Any, options: Any, path: Any, blocks: Any, steps: Any, history: Any, results: Any
+    cells: Any, options: Any, path: Any, blocks: Any, steps: Any, log: Any, results: Any
 ) -> None:
     law = step.Law(rising, True, True)
-    step.solve_cells(law, cells, options, path, blocks, steps, history, results)
+    step.solve_cells(law, cells, options, path, blocks, steps, log, results)
 
 
 @kernel
 def solve_decaying(
-    cells: Any, options: Any, path: Any, blocks: Any, steps: Any, history: Any, results: Any
+    cells: Any, options: Any, path: Any, blocks: Any, steps: Any, log: Any, results: Any
 ) -> None:
     law = step.Law(decaying_with_both, True, False)
-    step.solve_cells(law, cells, options, path, blocks, steps, history, results)
+    step.solve_cells(law, cells, options, path, blocks, steps, log, results)
 
 
 def motion_of(
     solve: Callable[..., None], rise: int, cycles: int, steps_per_cycle: int, **cell: float
-) -> Motion:
+) -> dict[str, float]:
     """Step a cell, by Simpson's rule; V and W are times ω and ω²."""
     cells = np.full((1, len(step.STEP_CELL.names or ())), np.nan).view(step.STEP_CELL)[:, 0]
     cells["tan_theta"] = tan(THETA)
@@ -81,17 +81,17 @@ def motion_of(
     for name, value in cell.items():
         cells[name] = value
     path = path_of_waveform(Sine(cycles=cycles))
-    results = np.empty((len(Motion._fields), 1))
+    results = np.empty((len(step.RESULTS), 1))
     solve(
         cells,
         Options(rise, EQ12, cycles, True, G),
         path,
         step.blocks_of(step.SIMPSON, steps_per_cycle, 0),
         step.steps_of(path, step.SIMPSON, steps_per_cycle, 0),
-        step.history_of(np.empty(0), np.empty(0)),
+        np.empty(0, step.LOG),
         results,
     )
-    return Motion(*results[:, 0])
+    return dict(zip(step.RESULTS, results[:, 0], strict=True))
 
 
 # ------------------------------------------------------------------ the same by SciPy
@@ -135,7 +135,7 @@ def test_newmarks_block_whose_friction_depends_on_velocity(
     end, _, expected = integrate(rate, onset, 1.0 / FREQUENCY, 0.0)
     assert end < 1.0 / FREQUENCY, "it comes to rest within the cycle"
     found = motion_of(solve, NEWMARK, 3, 512, mu_s=mu_s, amplitude=amplitude)
-    assert found.displacement / OMEGA**2 == pytest.approx(3.0 * expected, rel=1e-8)
+    assert found["permanent_displacement"] / OMEGA**2 == pytest.approx(3.0 * expected, rel=1e-8)
 
 
 @pytest.mark.parametrize("steps", [128, 512])
@@ -163,7 +163,7 @@ def test_stick_slip_by_a_law_of_acceleration_and_velocity(steps: int) -> None:
     if end >= 2.0 * peak:
         expected += 0.5 * velocity**2 / held
     found = motion_of(solve_decaying, LITERAL, 1, steps, amplitude=amplitude, **cell)
-    assert found.displacement / OMEGA**2 == pytest.approx(expected, rel=4e4 / steps**4)
+    assert found["permanent_displacement"] / OMEGA**2 == pytest.approx(expected, rel=4e4 / steps**4)
 
 
 def test_continuous_sliding_by_a_law_of_acceleration_and_velocity() -> None:
@@ -192,5 +192,5 @@ def test_continuous_sliding_by_a_law_of_acceleration_and_velocity() -> None:
         )
         state = tuple(solution.y[:, -1])
     found = motion_of(solve_decaying, LITERAL, 3, 1024, amplitude=amplitude, **cell)
-    assert found.sliding_mode == 2.0
-    assert found.displacement / OMEGA**2 == pytest.approx(state[1], rel=1e-7)
+    assert found["sliding_mode"] == 2.0
+    assert found["permanent_displacement"] / OMEGA**2 == pytest.approx(state[1], rel=1e-7)

@@ -119,6 +119,11 @@ WRONG: list[tuple[type[Choice], dict[str, Any], str]] = [
     ),
     (
         Harmonics,
+        {"amplitudes": [1, 1], "multiples": [0, 1]},
+        "multiples[0] = 0: must be a whole number >= 1",
+    ),
+    (
+        Harmonics,
         {"amplitudes": [1, 2], "multiples": [1, 2], "phases": [0]},
         "phases: 1 numbers; must be as many",
     ),

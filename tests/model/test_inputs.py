@@ -13,7 +13,7 @@ import xarray as xr
 
 import slipsweep
 from slipsweep import InputError
-from slipsweep.model.parameters import check_values
+from slipsweep.model.parameters import check_single, check_values
 
 RECORD = slipsweep.Record(np.arange(5) / 10, np.array([0.0, 4.0, -4.0, 2.0, 0.0]))
 UNCERTAIN = {"mu_s": {"distribution": "lognorm", "s": 0.1, "kind": "factor"}}
@@ -29,6 +29,10 @@ FUNCTIONS: dict[str, tuple[Callable[..., xr.Dataset], dict[str, Any]]] = {
     "limit_amplitude": (
         slipsweep.limit_amplitude,
         {"displacement": 0.1, **BLOCK, "frequency": 1.0},
+    ),
+    "required_strength": (
+        slipsweep.required_strength,
+        {"displacement": 0.1, "of": "mu_s", "theta": 5.0, "amplitude": 3.0, "frequency": 1.0},
     ),
     "sample": (slipsweep.sample, {**CELL, "uncertain": UNCERTAIN, "samples": 8}),
 }
@@ -227,3 +231,27 @@ def test_where_u_is_defined_its_direction_is_said() -> None:
     result = call("sweep", variables=["permanent_displacement", "newmark_displacement"])
     for variable in (*result.data_vars.values(), call("simulate").relative_displacement):
         assert "cos(phi - theta) / cos(phi)" in variable.attrs["comment"]
+
+
+@pytest.mark.parametrize(
+    ("name", "least", "most"),
+    [
+        ("theta", 0.0, 89.999),
+        ("mu_s", 1e-30, 1e30),
+        ("frequency", 1e-30, 1e30),
+        ("amplitude", 0.0, 1e30),
+        ("yield_acceleration", -1e30, 1e30),
+        ("decay_rate", 0.0, 1e30),
+        ("azimuth", 0.0, 360.0),
+        ("ramp_in", 0.0, 100.0),
+    ],
+)
+def test_bounds_of_parameters_hold_their_ends_and_nothing_beyond(
+    name: str, least: float, most: float
+) -> None:
+    for inside in (least, most):
+        assert check_single(name, inside) == inside
+    step = max(abs(least), 1e-300) * 1e-3
+    for outside in (least - step, most * 1.001, float("nan"), float("inf")):
+        with pytest.raises(InputError, match=f"^{name} = "):
+            check_single(name, outside)

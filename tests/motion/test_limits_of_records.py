@@ -22,6 +22,19 @@ def read(folder: Path, times: Any, values: Any, **how: Any) -> Record:
     return read_record(path, units="g", **how)
 
 
+@pytest.mark.parametrize(("baseline", "degree"), [("mean", 0), ("linear", 1)])
+def test_a_baseline_is_the_constant_or_the_line_of_least_squares(
+    baseline: Any, degree: int
+) -> None:
+    """Of a drift that is neither."""
+    times: Any = TIMES + 3.0
+    values: Any = SHAKING + 0.01 * (TIMES - 2.0) ** 2
+    record = Record(times, values)
+    taken = record.acceleration - record.corrected(baseline).acceleration
+    line = np.polyfit(record.times, record.acceleration, degree)
+    np.testing.assert_allclose(taken, np.polyval(line, record.times), rtol=1e-9)
+
+
 @pytest.mark.parametrize(("intervals", "refused"), [(4, False), (6, True)])
 def test_a_gap_is_more_than_five_intervals(tmp_path: Path, intervals: int, refused: bool) -> None:
     kept = np.delete(np.arange(1001), np.arange(500, 499 + intervals))

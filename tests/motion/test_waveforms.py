@@ -182,3 +182,11 @@ def test_one_plain_cycle_stands_for_all() -> None:
     long = wave_of(replace(EVERY["ramped triangle"], cycles=10**9))
     assert long.repeats == 10**9 - long.lead - 3
     assert len(long.pieces) == 4 * (long.lead + 4)
+
+
+def test_a_wave_in_words_has_its_ramps_at_their_ends() -> None:
+    words = "10 cycles of a triangle wave, ramp in 1 cycles, ramp out 2.5 cycles"
+    assert str(Triangle(ramp_in=1, ramp_out=2.5)) == words
+    assert str(Sine(cycles=1)) == "1 cycle of a sine"
+    wave = Harmonics([1, 0.3], [1, 3], [0, 180], cycles=2)
+    assert str(wave) == "2 cycles of a wave of harmonics 1:1:0, 0.3:3:180"

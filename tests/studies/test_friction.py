@@ -12,6 +12,7 @@ from scipy import stats
 import slipsweep
 from slipsweep import InputError
 from slipsweep.model import equations
+from slipsweep.motion.shaking import read_test
 from slipsweep.studies.friction import _mean, eq1_friction
 from tests.support.shaking import CONTINUOUS, STICK_SLIP, coulomb, exact, measured
 
@@ -281,3 +282,29 @@ def test_the_friction_angle_stands_for_the_coefficient() -> None:
         slipsweep.measured_friction(path, 5.0)
     with pytest.raises(InputError, match=r"^phi, mu_s: must not both be given"):
         slipsweep.calibrate(path, 5.0, 0.38, phi=phi)
+
+
+@pytest.mark.parametrize(
+    ("separator", "comma"), [(";", ","), ("\t", ","), (";", "."), (",", "."), ("\t", ".")]
+)
+def test_columns_between_semicolons_and_tabs_may_have_decimal_commas(
+    tmp_path: Path, separator: str, comma: str
+) -> None:
+    """A column of another name is left out; milliseconds and gal are converted."""
+    times = np.arange(20) * 0.005
+    table = np.round(3.0 * np.sin(40.0 * times), 3)
+    heading = [
+        "time (ms)",
+        "temperature (K)",
+        "table acceleration (gal)",
+        "block acceleration (m/s2)",
+    ]
+    lines = [separator.join(heading)]
+    for time, value in zip(times, table, strict=True):
+        numbers = (1000.0 * time, 293.15, 100.0 * value, 0.5 * value)
+        lines.append(separator.join(f"{number:.6f}".replace(".", comma) for number in numbers))
+    (tmp_path / "test.csv").write_text("\n".join(lines) + "\n")
+    test = read_test(tmp_path / "test.csv")
+    np.testing.assert_allclose(test.times, times, atol=1e-9)
+    np.testing.assert_allclose(test.channels["ground_acceleration"], table, atol=1e-8)
+    np.testing.assert_allclose(test.channels["block_acceleration"], 0.5 * table, atol=1e-6)

@@ -340,6 +340,6 @@ def test_an_error_in_the_kernel_is_raised(monkeypatch: pytest.MonkeyPatch) -> No
     def out_of_memory(*_: Any) -> None:
         raise MemoryError("no room for the workspace")
 
-    monkeypatch.setattr("slipsweep.kernels.history.fill_history", out_of_memory)
+    monkeypatch.setattr("slipsweep.grid.solvers.fill_history", out_of_memory)
     with pytest.raises(MemoryError, match="workspace"):
         history(0.3, Sine())

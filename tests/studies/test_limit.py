@@ -14,7 +14,7 @@ from slipsweep import InputError, Mendez, Record, SlidingMode, Validity, limit_a
 from slipsweep.model.variables import RECORD_COUNTS, LimitStatus
 from tests.support.cases import choices
 from tests.support.commands import command
-from tests.support.made_up_records import few_pulses, made
+from tests.support.made_up_records import few_pulses, made, write_motion
 
 
 def sweep_at(amplitude: xr.DataArray, inputs: dict[str, Any], **options: Any) -> xr.DataArray:
@@ -191,10 +191,12 @@ def test_narrow_peaks_where_blocks_do_not_recouple() -> None:
     ]
     columns = zip(names, zip(*rows, strict=True), strict=True)
     given: dict[str, Any] = {name: xr.DataArray([*values], dims="case") for name, values in columns}
-    target = given.pop("displacement")
-    limits = limit_amplitude(displacement=target, frequency=1.0, **given).limit_amplitude
+    # at the same amplitudes u ∝ 1/f²: metres and centimetres
+    given["frequency"] = xr.DataArray([1.0, 10.0] * 3 + [10.0], dims="case")
+    target = given.pop("displacement") / given["frequency"] ** 2
+    limits = limit_amplitude(displacement=target, **given).limit_amplitude
     amplitudes = np.geomspace(0.05, 6.0, 20_001)
-    moved = sweep(amplitude=amplitudes, frequency=1.0, **given).permanent_displacement
+    moved = sweep(amplitude=amplitudes, **given).permanent_displacement
     first = amplitudes[(moved >= target).transpose("case", "amplitude").values.argmax(axis=1)]
     assert ((limits <= first) & (limits > 0.9 * first)).all()
 
@@ -375,6 +377,31 @@ def test_no_limit_and_what_is_refused(shaking: Record) -> None:
         limit_amplitude(0.1, 5.0, 0.4, excitation=Record.sampled([0.0, 0.0, 0.0], 0.1))
 
 
+@pytest.mark.parametrize(
+    ("axes", "excitation"),
+    [
+        ("displacement_amplitude.values = [0.01, 0.02]\nfrequency.values = [2]", ""),
+        ("scale.values = [1, 2]", '[excitation]\nrecord = "m.csv"\nunits = "g"\n'),
+        ("pgv.values = [0.1, 0.3]", '[excitation]\nrecord = "m.csv"\nunits = "g"\n'),
+    ],
+)
+def test_limits_of_a_sweep_do_not_depend_on_its_strengths(
+    tmp_path: Path, axes: str, excitation: str
+) -> None:
+    """The axis of the shaking's strength, whichever it is, gives way to the amplitude sought."""
+    write_motion(tmp_path / "m.csv", 3, 100, 0.02)
+    block = 'theta.values = [2]\nmu_s.values = [0.2]\n[model]\nfriction = "newmark"\n'
+    (tmp_path / "a.toml").write_text(f"[axes]\n{axes}\n{block}{excitation}")
+    done = command(tmp_path, "limit", "a.toml", "-d", "1cm", "-o", "a.nc", "--quiet")
+    assert (done.returncode, done.stderr) == (0, "")
+    shaking: dict[str, Any] = {"frequency": 2.0}
+    if excitation:
+        shaking = {"excitation": slipsweep.read_record(tmp_path / "m.csv", units="g")}
+    expected = limit_amplitude(0.01, 2.0, 0.2, **shaking, model="newmark")
+    found = slipsweep.open_result(tmp_path / "a.nc").limit_amplitude.load()
+    assert found.squeeze().item() == expected.limit_amplitude.item()
+
+
 def test_the_search_ends_at_five_g_of_the_models_gravity() -> None:
     """A limit between 3 and 5 g is found, one above 5 g is not reached."""
     for g in (9.81, 1.62):
@@ -385,6 +412,40 @@ def test_the_search_ends_at_five_g_of_the_models_gravity() -> None:
             found.limit_status, [LimitStatus.REACHED, LimitStatus.NOT_REACHED]
         )
         assert 3.5 * g < found.limit_amplitude[0] < 5.0 * g
+
+
+@pytest.mark.parametrize(
+    "motion", [{"frequency": [0.5, 2.0]}, {"excitation": few_pulses(), "polarity": "both"}]
+)
+def test_limits_both_ways_are_of_the_largest_displacement(motion: dict[str, Any]) -> None:
+    """Reached by the largest |u| over time at the limit, not at the number before, nor below."""
+    both = slipsweep.Newmark(sliding="both")
+    blocks: tuple[dict[str, Any], ...] = (
+        {"theta": [0.0, 6.0], "mu_s": [0.2, 0.5]},
+        {"yield_coefficient": [0.3, 0.05], "upslope_yield_acceleration": 1.0},
+    )
+    for block in blocks:
+        given: dict[str, Any] = {**block, **motion, "model": both}
+        limits = limit_amplitude([0.003, 0.1], **given)
+        assert limits.attrs["criterion"].startswith("largest displacement over time")
+        limit = limits.limit_amplitude
+        assert limit.notnull().all()
+
+        def largest(amplitude: xr.DataArray, given: dict[str, Any] = given) -> xr.DataArray:
+            result = sweep(amplitude=amplitude, **given)
+            downslope: xr.DataArray = result.largest_displacement
+            upslope = -result.smallest_displacement
+            both_ways = downslope.where(downslope > upslope, upslope)
+            return both_ways.transpose(*amplitude.dims, ...)
+
+        assert (largest(limit) >= limits.displacement).all()
+        before = xr.apply_ufunc(np.nextafter, limit, 0.0)
+        assert (largest(before) < limits.displacement).all()
+        shares = xr.DataArray(np.linspace(0.02, 0.999, 300), dims="share")
+        assert (largest(limit * shares) < limits.displacement).all()
+        for name in ("largest_displacement", "smallest_displacement"):
+            at_limit = sweep(amplitude=limit, **given)[name].transpose(*limit.dims)
+            np.testing.assert_array_equal(limits[name], at_limit)
 
 
 SWEEP = """

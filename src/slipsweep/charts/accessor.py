@@ -66,9 +66,9 @@ class SlipsweepAccessor:
             "spread"; of a sweep under a suite "motions", "fragility", "intensity" or "histogram",
             under one record "motions"; of statistics (`sample`, `suite_statistics`) "fragility",
             "quantiles" or "sensitivity".  Results of `simulate` ("history"), `limit_amplitude`
-            ("limit"), `displacement_hazard` ("hazard"), `calibrate` ("calibration") and
-            `measured_friction` ("friction") have one chart each.  By default the first one that a
-            dataset has; of a sweep with one axis left "curve".
+            ("limit"), `required_strength` ("strength"), `displacement_hazard` ("hazard"),
+            `calibrate` ("calibration") and `measured_friction` ("friction") have one chart each.
+            By default the first one that a dataset has; of a sweep with one axis left "curve".
         at : mapping of axis to value, optional
             Value of an axis: a number in its own unit, a text with another ("0.3g"), the label of a
             case or motion; by default its middle.  "ky" is `yield_coefficient`, and "mu_s" beside
@@ -103,7 +103,7 @@ class SlipsweepAccessor:
             Axes to draw a chart of one panel in, with its legend and caption.
         equations : sequence of str or str
             Published equations to draw beside, of `slipsweep.published.EQUATIONS`; with "curve",
-            "motions", "intensity" and "dimensionless".
+            "motions", "intensity", "dimensionless" and "strength".
         magnitude : float, optional
             Moment magnitude M, for the equations that need it.
 

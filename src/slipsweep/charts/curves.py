@@ -17,7 +17,7 @@ from slipsweep.charts.slices import Result
 from slipsweep.charts.style import Look
 from slipsweep.errors import InputError
 from slipsweep.model.options import MODELS, Mendez, Model, Newmark
-from slipsweep.model.variables import CAUTIONS, RESULTS, STRENGTHS
+from slipsweep.model.variables import CAUTIONS, STRENGTHS, has_signed_displacements
 
 Curve = tuple[style.Floats, style.Floats]
 
@@ -94,10 +94,11 @@ def _drawn(sheet: Sheet, name: str, scaled: bool = False) -> Figure:
     """Curves of a result, of the displacement with Newmark's; `scaled` as uω²/A over A/Üy."""
     factor: Any = 1000.0 if style.unit(name) == "m" else 1.0
     units, least = ("mm", 1.0) if factor > 1 else (sheet.options.unit(name), None)
-    label = f"{RESULTS[name]['long_name']} ({units})".removesuffix(" ()")
+    label = f"{style.result_text(sheet.data.attrs, name)} ({units})".removesuffix(" ()")
     sheet.show(name, "Barred curves")
     if scaled:
-        label = "permanent displacement, u\u00a0ω²\u00a0/\u00a0A"
+        symbol = style.displacement_symbol(sheet.data.attrs)
+        label = f"permanent displacement, {symbol}\u00a0ω²\u00a0/\u00a0A"
         least = 1e-4
         factor = (2 * np.pi * sheet.data["frequency"]) ** 2 / sheet.data["amplitude"]
         sheet.data["over_yield"] = sheet.data["amplitude"] / sheet.data["yield_line"]
@@ -136,6 +137,10 @@ def spread(result: Result, options: style.Options) -> Figure:
     if "yield_coefficient" in result.data.coords:
         raise InputError(
             f"{result.name}: the result has ky alone: other options of the model need theta and mu_s"
+        )
+    if has_signed_displacements(result.attrs):
+        raise InputError(
+            f"{result.name}: the block slides both ways: the other options slide downslope only"
         )
     sheet = result.sheet(options, result.compared(solved.DISPLACEMENT), solved.DRIVES)
     # the others have a mode limit, whatever this one is

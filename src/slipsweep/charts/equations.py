@@ -12,9 +12,10 @@ from slipsweep.errors import InputError
 from slipsweep.model.parameters import GRAVITY
 from slipsweep.published import EQUATIONS, Estimate
 from slipsweep.studies.published_statistics import conditions_texts, estimates
+from slipsweep.studies.published_strength import strength_by
 
 #: Kinds of charts that draw them.
-KINDS = ("curve", "dimensionless", "motions", "intensity")
+KINDS = ("curve", "dimensionless", "motions", "intensity", "strength")
 
 #: Equations for N cycles of a period, which the dimensionless chart draws.
 NORMALISED = tuple(name for name, one in EQUATIONS.items() if "cycles" in one.inputs)
@@ -121,6 +122,34 @@ def draw_normalised(sheet: Sheet, panel: Panel) -> None:
     _note(sheet, names)
 
 
+def draw_strengths(sheet: Sheet, panel: Panel) -> None:
+    """Draw the yield coefficients that equations require, over the axis of a panel."""
+    names = _names(sheet)
+    data = panel.data
+    if panel.y is not None:
+        raise InputError(
+            f"--equations: are drawn beside one curve, and there is one for each {panel.y}: choose "
+            f"a value with --at {panel.y}=VALUE"
+        )
+    if data.attrs.get("required") != "yield_coefficient":
+        raise InputError("--equations: only beside required yield coefficients")
+    along = xr.DataArray(np.zeros(panel.xs.size), dims=panel.x)
+    for number, name in enumerate(names):
+        curves = {}
+        for share in _SHARES:
+            strength, inside = strength_by(data, name, sheet.options.magnitude, share)
+            for dim in (one for one in strength.dims if one != panel.x):
+                raise InputError(
+                    f"--equations: {name} varies along {dim}: choose a value with --at"
+                )
+            curves[share] = (
+                strength.broadcast_like(along).values,
+                inside.broadcast_like(along).values,
+            )
+        _draw_equation(sheet, panel, panel.xs, name, (number, len(names)), curves)
+    _note(sheet, names)
+
+
 def _names(sheet: Sheet) -> tuple[str, ...]:
     """The equations that a chart was asked for (InputError: more than can be told apart)."""
     names = tuple(sheet.options.equations)
@@ -139,29 +168,48 @@ def _draw_each(
     sheet: Sheet, panel: Panel, xs: Floats, each: dict[str, Estimate], factor: float = 1000.0
 ) -> None:
     """Draw estimates along `xs`, their displacements times `factor`."""
-    looks = zip(each, _COLOURS, _DASHES, _MARKERS, strict=False)
-    for number, (name, colour, dash, marker) in enumerate(looks):
-        estimate = each[name]
-        is_scattered = bool((np.asarray(estimate.log_standard_deviation) > 0.0).any())
-        for share in _SHARES if is_scattered else _SHARES[:1]:
-            values = np.asarray(estimate.quantile(share)) * factor
-            line: Look = {"color": colour, "linestyle": dash, "gid": f"{name} {share:.0%}"}
-            line |= {"linewidth": 1.5 if share == 0.5 else 0.6, "zorder": 2.5}
-            _draw_line(sheet, panel, xs, values, np.asarray(estimate.in_range, bool), line)
-        # side by side with those of other equations
-        shift = (number + 0.5) / len(each)
-        marked = ((np.arange(_MARKED) + shift) / _MARKED * xs.size).astype(int)
-        median = np.asarray(estimate.quantile(0.5)) * factor
-        median = np.where(median > 0.0, median, np.nan)
-        marks: Look = {"marker": marker, "markerfacecolor": "white", "markersize": 5}
-        marks |= {"color": colour, "zorder": 2.6}
-        panel.axes.plot(xs[marked], median[marked], linestyle="", **marks)
-        handle = Line2D([], [], linestyle=dash, linewidth=1.5, **marks)
-        sheet.legend[EQUATIONS[name].label] = handle
-        if is_scattered:
-            thin: Look = {"color": "0.3", "linewidth": 0.6, "linestyle": _DASHES[0]}
-            sheet.remarks["equation, ± one standard deviation"] = Line2D([], [], **thin)
-        _widen(panel, median)
+    for number, (name, estimate) in enumerate(each.items()):
+        inside = np.asarray(estimate.in_range, bool)
+        curves = {
+            share: (np.asarray(estimate.quantile(share)) * factor, inside) for share in _SHARES
+        }
+        _draw_equation(sheet, panel, xs, name, (number, len(each)), curves)
+        median = curves[0.5][0]
+        _widen(panel, np.where(median > 0.0, median, np.nan))
+
+
+def _draw_equation(
+    sheet: Sheet,
+    panel: Panel,
+    xs: Floats,
+    name: str,
+    place: tuple[int, int],
+    curves: dict[float, tuple[Floats, Any]],
+) -> None:
+    """Draw the curves of an equation by their shares, each with where it is in range.
+
+    `place` is its number among the equations of the chart, and how many there are.
+    """
+    number, count = place
+    colour = _COLOURS[number]
+    dash = _DASHES[number]
+    median = curves[0.5][0]
+    is_scattered = any(not np.array_equal(values, median) for values, _ in curves.values())
+    for share in _SHARES if is_scattered else _SHARES[:1]:
+        line: Look = {"color": colour, "linestyle": dash, "gid": f"{name} {share:.0%}"}
+        line |= {"linewidth": 1.5 if share == 0.5 else 0.6, "zorder": 2.5}
+        _draw_line(sheet, panel, xs, *curves[share], line)
+    # side by side with those of other equations
+    marked = ((np.arange(_MARKED) + (number + 0.5) / count) / _MARKED * xs.size).astype(int)
+    marks: Look = {"marker": _MARKERS[number], "markerfacecolor": "white", "markersize": 5}
+    marks |= {"color": colour, "zorder": 2.6}
+    shown = np.where(median > 0.0, median, np.nan)
+    panel.axes.plot(xs[marked], shown[marked], linestyle="", **marks)
+    handle = Line2D([], [], linestyle=dash, linewidth=1.5, **marks)
+    sheet.legend[EQUATIONS[name].label] = handle
+    if is_scattered:
+        thin: Look = {"color": "0.3", "linewidth": 0.6, "linestyle": _DASHES[0]}
+        sheet.remarks["equation, ± one standard deviation"] = Line2D([], [], **thin)
 
 
 def _draw_line(

@@ -77,13 +77,7 @@ def history(result: Result, options: Options) -> Figure:
     _plot(accelerations, data, "block_acceleration", linestyle="--", label="block")
     if modes:
         _draw_modes(drawing.grid[0, 0], data)
-        highest = data["half_wave_peak"].values.max(initial=0.0)
-        for name, value in thresholds(data).items():
-            if np.isfinite(value) and value <= 1.5 * highest:
-                text, look = style.LINES[str(name)]
-                accelerations.axhline(
-                    value.item(), label=text, gid=name, **{**look, "linewidth": 0.9, "zorder": 1.5}
-                )
+        _draw_thresholds(accelerations, data)
     accelerations.legend(fontsize="small", **_ABOVE)
     for panel in coefficient:
         _plot(panel, data, "friction_coefficient")
@@ -100,6 +94,21 @@ def history(result: Result, options: Options) -> Figure:
     if slides_back := slides_back_text(data):
         drawing.note(f"Here {slides_back}.", "Would also slide upslope: displacement too large.")
     return _finish(drawing, labels, [style.caption(data, options)])
+
+
+def _draw_thresholds(panel: Axes, data: xr.Dataset) -> None:
+    """Lines at the accelerations of yield and of the mode limit, if the base comes near them."""
+    lines = thresholds(data)
+    if "upslope_line" in lines:  # a line either way, not that of the first of them
+        lines = lines.drop_vars("yield_line")
+    highest = data["half_wave_peak"].values.max(initial=0.0)
+    lowest = data["ground_acceleration"].values.min(initial=0.0)
+    for name, value in lines.items():
+        if np.isfinite(value) and 1.5 * lowest <= value <= 1.5 * highest:
+            text, look = style.LINES.get(str(name), style.LINES["yield_line"])
+            label = None if name == "upslope_line" else text
+            own = {**look, "linewidth": 0.9, "zorder": 1.5}
+            panel.axhline(value.item(), label=label, gid=name, **own)
 
 
 def _draw_modes(panel: Axes, data: xr.Dataset) -> None:

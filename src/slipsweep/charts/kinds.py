@@ -28,7 +28,7 @@ from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.opening import values_text
 from slipsweep.files.selection import At, own_names
 from slipsweep.model.options import MODELS
-from slipsweep.model.variables import PARAMETERS, Validity
+from slipsweep.model.variables import PARAMETERS, Validity, has_signed_displacements
 
 Draw = Callable[[Result, Options], Figure]
 
@@ -58,6 +58,7 @@ SORTS: dict[str, tuple[str, tuple[Draw, ...]]] = {
     "record": ("a sweep under a recorded motion", (curves.motions,)),
     "history": ("a time history", (histories.history,)),
     "limit": ("limit amplitudes", (limits.limit,)),
+    "strength": ("required strengths", (limits.strength,)),
     "friction": ("measured friction", (histories.friction,)),
     "calibration": ("a calibration", (histories.calibration,)),
     "hazard": ("annual rates", (limits.hazard,)),
@@ -101,7 +102,9 @@ def fitting(result: Result, options: Options) -> list[str]:
     if solved.is_newmark(
         result.data
     ):  # the ratio is 1, and without θ and μs there are no other options
-        unfit |= {"newmark", *(["spread"] if "yield_coefficient" in result.data.coords else [])}
+        unfit |= {"newmark"}
+        if "yield_coefficient" in result.data.coords or has_signed_displacements(result.attrs):
+            unfit |= {"spread"}
     return [kind for kind in kinds if kind not in unfit]
 
 

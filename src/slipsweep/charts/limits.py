@@ -1,4 +1,4 @@
-"""Charts of what a tolerable displacement allows: limit amplitudes, and mean annual rates of exceedance."""
+"""Charts of what a displacement allows: limit amplitudes, required strengths, annual rates."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from slipsweep.charts import style
+from slipsweep.charts import equations, style
 from slipsweep.charts.sheet import (
     Drawing,
     Panel,
@@ -21,7 +21,7 @@ from slipsweep.charts.style import Floats, Look, Options
 from slipsweep.charts.suites import draw_suite, suite_text
 from slipsweep.errors import InputError
 from slipsweep.files.selection import axis_labels
-from slipsweep.model.variables import LimitStatus
+from slipsweep.model.variables import STRENGTHS, LimitStatus, StrengthStatus
 from slipsweep.published import EQUATIONS
 from slipsweep.studies.suite_statistics import SUITE, limit_quantiles
 
@@ -61,6 +61,7 @@ def _draw_curves(sheet: Sheet, panel: Panel) -> None:
     xs = panel.xs
     limits = panel.grid("limit_amplitude") / panel.g
     states = panel.grid("limit_status")
+    _draw_family(sheet, panel, limits)
     circle: Look = {
         "linestyle": "none",
         "marker": "o",
@@ -68,16 +69,21 @@ def _draw_curves(sheet: Sheet, panel: Panel) -> None:
         "color": "0.82",
         "zorder": 1.5,
     }
-    for member, look in enumerate(curve_looks(len(limits))):
-        line = plot_curve(panel.axes, xs, limits[member], member / len(limits), **look)
-        if panel.y:
-            sheet.legend[panel.member(member)] = line
+    for member in range(len(limits)):
         abrupt = (states[member] >= LimitStatus.AT_MODE_JUMP) & (
             states[member] <= LimitStatus.AFTER_GAP
         )
         if abrupt.any():
             (marks,) = panel.axes.plot(xs[abrupt], limits[member][abrupt], **circle)
             sheet.remarks["set by a discontinuity\nof the model"] = marks
+
+
+def _draw_family(sheet: Sheet, panel: Panel, values: Floats) -> None:
+    """Draw a curve for each row of values, and name it if there are several."""
+    for member, look in enumerate(curve_looks(len(values))):
+        line = plot_curve(panel.axes, panel.xs, values[member], member / len(values), **look)
+        if panel.y:
+            sheet.legend[panel.member(member)] = line
 
 
 def _draw_motions(sheet: Sheet, panel: Panel) -> None:
@@ -92,19 +98,101 @@ def _draw_motions(sheet: Sheet, panel: Panel) -> None:
         lines = limits.transpose(*SUITE, panel.x, missing_dims="ignore").values
         draw_suite(sheet, panel.axes, xs, lines / panel.g, quantiles)
         return
-    # no lines from motion to motion: a row of points for each polarity, and the quantiles across
-    # all of them
+    _draw_points(sheet, panel, limits / panel.g, quantiles)
+
+
+def _draw_points(
+    sheet: Sheet, panel: Panel, values: xr.DataArray, quantiles: Floats, band: str = "16 to 84 %"
+) -> None:
+    """Draw a point for each motion and polarity, and the quantiles across all of them."""
+    xs = panel.xs
     ends = np.array([0.5, xs.size + 0.5])
-    draw_suite(
-        sheet, panel.axes, ends, np.empty((0, 2)), np.repeat(quantiles.reshape(-1, 1), 2, axis=1)
-    )
+    across = np.repeat(quantiles.reshape(-1, 1), 2, axis=1)
+    draw_suite(sheet, panel.axes, ends, np.empty((0, 2)), across, band=band)
     panel.axes.set_xlim(*ends)
-    points = limits.transpose("motion", ...).values.reshape(xs.size, -1)
-    polarities = panel.data["polarity"].values if "polarity" in limits.dims else ()
+    points = values.transpose("motion", ...).values.reshape(xs.size, -1)
+    polarities = panel.data["polarity"].values if "polarity" in values.dims else ()
     names = [f"polarity {one:g}" for one in polarities] or ["a motion"]
     look: Look = {"linestyle": "", "markerfacecolor": "white", "color": "0.2"}
-    for name, row, marker in zip(names, points.T / panel.g, "os", strict=False):
+    for name, row, marker in zip(names, points.T, "os", strict=False):
         (sheet.legend[name],) = panel.axes.plot(xs, row, marker=marker, **look)
+
+
+def strength(result: Result, options: Options) -> Figure:
+    """Required strengths over one axis: of a suite or of samples with median and band."""
+    of = str(result.attrs["required"])
+    name = f"required_{of}"
+    has_band = f"{name}_quantile" in result.variables
+    counts = ("always_within_count", "never_within_count")
+    names = [f"{name}_quantile", *counts] if has_band else ["required_status"]
+    names += [name] if name in result.variables else []
+    suite = [dim for dim in SUITE if dim in result.dims and has_band]
+    single = suite and not {*result.wide} - {*SUITE, "quantile", *options.at}
+    along = "motion" if single else ("amplitude", *STRENGTHS, "frequency", "theta", "displacement")
+    curves = None if has_band else ("displacement", "theta", "amplitude", "case")
+    if single:  # the quantiles have no such axis
+        names = [name, *names[:-1]]
+    keep = [*suite, *(["quantile"] if has_band else [])]
+    shown = replace(options, more_panels=True)
+    sheet = result.sheet(shown, names, along, curves=curves, keep=keep)
+    for panel in sheet.panels:
+        panel.axes.grid(color="0.9", which="both")
+        panel.axes.set_ylabel(f"required {style.axis_label(of, options)}")
+        if not has_band:
+            _draw_family(sheet, panel, panel.grid(name))
+        else:
+            _draw_required(sheet, panel, name)
+        if sheet.x in NAMED:
+            labels = [style.plain(label) for label in axis_labels(sheet.data, sheet.x)]
+            panel.axes.set_xticks(panel.xs, labels, rotation=40, ha="right")
+            panel.axes.set_xlabel(sheet.x)
+        if options.equations:
+            equations.draw_strengths(sheet, panel)
+    sheet.panels[0].axes.set_ylim(bottom=0.0)
+    sheet.note(_required_text(sheet.data, has_band))
+    return sheet.done()
+
+
+def _draw_required(sheet: Sheet, panel: Panel, name: str) -> None:
+    """Draw strengths of motions, if the result has them, with their median and band."""
+    quantiles = panel.data[f"{name}_quantile"].transpose("quantile", ...)
+    values = quantiles.where(np.isfinite(quantiles)).values
+    shares = quantiles["quantile"].values
+    middle = np.flatnonzero(shares == 0.5)
+    median = values[middle[0]] if middle.size else np.full_like(values[0], np.nan)
+    band = f"{100.0 * shares[0]:.3g} to {100.0 * shares[-1]:.3g} %"
+    edges = np.stack([values[0], median, values[-1]])
+    if panel.x == "motion":
+        _draw_points(sheet, panel, panel.data[name], edges, band)
+        return
+    lines = np.empty((0, panel.xs.size))
+    if name in panel.data:
+        strengths = panel.data[name]
+        lines = strengths.transpose(*SUITE, panel.x, missing_dims="ignore").values
+    draw_suite(sheet, panel.axes, panel.xs, lines, edges, band=band)
+
+
+def _required_text(data: xr.Dataset, has_band: bool) -> str:
+    """Return what the band is of, and how many no strength holds, or every one."""
+    texts = []
+    if has_band:
+        runs = str(data.attrs.get("pooled", ""))
+        if "samples" in data.attrs:
+            runs = f"{runs} x {data.attrs['samples']} samples".removeprefix(" x ")
+        texts.append(f"Median and band: quantiles of the required strength over {runs}.")
+        always = int(data["always_within_count"].max())
+        never = int(data["never_within_count"].max())
+    else:
+        status = data["required_status"]
+        always = int((status == StrengthStatus.ALWAYS_WITHIN).sum())
+        never = int((status == StrengthStatus.NEVER_WITHIN).sum())
+    if always:
+        texts.append(f"Up to {always} stay within at every strength; they count as the least.")
+    if never:
+        texts.append(f"Up to {never} stay within at no strength; they count as above all others.")
+    if "criterion" in data.attrs:
+        texts.append(f"Displacement: {data.attrs['criterion']}.")
+    return " ".join(texts)
 
 
 def _suite_text(data: xr.Dataset) -> str:
@@ -168,7 +256,7 @@ def hazard(result: Result, options: Options) -> Figure:
         xscale="log",
         yscale="log",
         xlabel="permanent displacement d (mm)",
-        ylabel="mean annual rate of u > d (1/year)",
+        ylabel=f"mean annual rate of {style.displacement_symbol(rates.attrs)} > d (1/year)",
     )
     panel.grid(color="0.9", which="both")
     for look, name, line, part in zip(curve_looks(len(names)), names, lines, held, strict=True):

@@ -104,7 +104,7 @@ def contours(result: Result, options: Options) -> Figure:
     sheet.data["drawn"] = drawn.clip(min=levels[0] / 100)
     colours = style.COLOURS.resampled(len(levels) + 1)
     end = "min" if drawn.max() < levels[-1] else "both"
-    _fill_panels(sheet, colours, levels, texts, RESULTS[name]["long_name"], end)
+    _fill_panels(sheet, colours, levels, texts, style.result_text(sheet.data.attrs, name), end)
     return _finish(sheet, name)
 
 
@@ -255,7 +255,7 @@ def _levels(name: str, values: Floats) -> list[float]:
         return []
     low = float(there.min())
     high = float(there.max())
-    if name == DISPLACEMENT and low < 1.0 and high > 1e-3:
+    if RESULTS[name].get("units") == "m" and low < 1.0 and high > 1e-3:
         low = max(low, 1e-3)
         high = min(high, 1.0)
     else:

@@ -338,6 +338,16 @@ class Sheet(Drawing):
                 f"{percent} would also slide upslope: displacement too large.",
             )
 
+    def note_magnitude(self) -> None:
+        """Say that displacements are drawn without their signs, if they have signs."""
+        share = self.data.attrs.get(solved.UPSLOPE_SHARE)
+        if share is not None:
+            percent = solved.percent(share)
+            self.note(
+                f"Drawn is |u|: {percent} of the sliding cells shown end upslope, u < 0.",
+                f"|u|: {percent} end upslope.",
+            )
+
     def show(self, name: str, marked: str, always: bool = False) -> None:
         """Add to the slice what charts of a result draw.
 

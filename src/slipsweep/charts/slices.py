@@ -9,25 +9,35 @@ import numpy as np
 import xarray as xr
 
 from slipsweep.charts.sheet import Sheet
-from slipsweep.charts.solved import DISPLACEMENT, is_newmark, is_recorded, solve, with_amplitude
+from slipsweep.charts.solved import (
+    DISPLACEMENT,
+    by_magnitude,
+    is_newmark,
+    is_recorded,
+    solve,
+    with_amplitude,
+)
 from slipsweep.charts.style import SHOWN, Options, check_attributes
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.motions import read_embedded
 from slipsweep.files.selection import At, Place, axis_labels, between, find
-from slipsweep.model.options import check_one_way
 from slipsweep.model.variables import PARAMETERS, STATISTIC_COORDINATES, STATISTICS
 
 #: Dimensions whose places have names, and no order.
 NAMED = ("case", "motion")
 
-#: Variables by which results of functions other than `sweep` are known, and what those are called.
+#: Variables by which results of functions other than `sweep` are known, one of which they have.
 OTHER_SORTS = {
-    "limit": "limit_amplitude",
-    "calibration": "computed_ground_acceleration",
-    "friction": "friction_ratio",
-    "hazard": "annual_rate",
-    "history": "relative_displacement",
+    "limit": ("limit_amplitude",),
+    "strength": ("required_status", "never_within_count"),
+    "calibration": ("computed_ground_acceleration",),
+    "friction": ("friction_ratio",),
+    "hazard": ("annual_rate",),
+    "history": ("relative_displacement",),
 }
+
+#: Of them, those that have axes to draw over.
+_LIMITS = ("limit", "strength")
 
 #: Most curves of a family, panels across and down, and points of an axis that a figure can show.
 _CURVES = 6
@@ -45,17 +55,16 @@ class Result:
     """A result that is drawn: a dataset, and what it is called in errors.  Only what is drawn of it is read.
 
     `sort` says what it is a result of: "sweep", "statistics", "record", "suite", or one of
-    `OTHER_SORTS`, of which only limits have `variables`, the names of its results, and `dims`,
-    their dimensions.  InputError: it is no result, does not say what was solved, or has other units
-    than slipsweep writes.
+    `OTHER_SORTS`, of which only limits and required strengths have `variables`, the names of its
+    results, and `dims`, their dimensions.  InputError: it is no result, does not say what was
+    solved, or has other units than slipsweep writes.
     """
 
     def __init__(self, data: xr.Dataset, name: str | Path) -> None:
         self.name = str(name)
         self.attrs = data.attrs
         self.sort = _sort(data)
-        check_one_way(f"{name}: charts and explore", data.attrs.get("sliding"))
-        if self.sort in OTHER_SORTS and self.sort != "limit":
+        if self.sort in OTHER_SORTS and self.sort not in _LIMITS:
             self.data = data
             self.variables = []
             self.dims = []
@@ -200,7 +209,7 @@ class Result:
             self.result(solved[0])
         if solved:
             data = data.assign(solve(data, solved, motion=self.motion).data_vars)
-        return data.assign_attrs(picked=picked)
+        return by_magnitude(data.assign_attrs(picked=picked))
 
     def spread(self, dim: str, number: int) -> list[Place]:
         """At most `number` places on an axis, from end to end, in even steps if a few less have them."""
@@ -286,6 +295,7 @@ class Result:
             sheet.set_axis(side)
         if names[0] == DISPLACEMENT:
             sheet.note_slides_back(self.shaking)
+            sheet.note_magnitude()
         return sheet
 
     def _axis(
@@ -315,8 +325,8 @@ class Result:
 
 
 def _sort(data: xr.Dataset) -> str:
-    for sort, variable in OTHER_SORTS.items():
-        if variable in data:
+    for sort, names in OTHER_SORTS.items():
+        if any(name in data for name in names):
             return sort
     if any(name in STATISTICS for name in data.data_vars):
         return "statistics"

@@ -8,21 +8,23 @@ import numpy as np
 import xarray as xr
 
 from slipsweep.grid.tally import Tally
-from slipsweep.model.options import MODELS, SOLVERS, Mendez, Model, Newmark
+from slipsweep.model.options import MODELS, SOLVERS, Mendez, Model, Newmark, slides_both_ways
 from slipsweep.model.variables import (
     PARAMETERS,
     RECORD_INPUTS,
+    SIGNED,
     STRENGTHS,
     VALUELESS,
     WAVEFORM_INPUTS,
     SlidingMode,
     Validity,
+    has_signed_displacements,
 )
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import WAVEFORMS, peak_acceleration
 from slipsweep.studies.datasets import friction_parameters, sweep
-from slipsweep.studies.upslope import sliding_ways
+from slipsweep.studies.upslope import sliding_ways, upslope_yield_acceleration
 
 #: Amplitudes of a motion.
 DRIVES = ("amplitude", "displacement_amplitude")
@@ -38,6 +40,9 @@ _BLOCK = ("theta", "mu_s", "yield_acceleration")
 
 #: Coordinates that decide which way a block slides.
 _DRIVING = (*_BLOCK, *DRIVES, *STRENGTHS[1:], "time_scale", "polarity", "azimuth", "motion")
+
+#: Attribute of a slice whose displacements have lost their signs: the share that ends upslope.
+UPSLOPE_SHARE = "share_upslope"
 
 #: Flags of values that are unreliable, left out unless requested, and what captions say of them.
 LEFT_OUT = {
@@ -63,6 +68,21 @@ def is_newmark(data: xr.Dataset) -> bool:
     return bool(data.attrs["model"] == "newmark")
 
 
+def by_magnitude(data: xr.Dataset) -> xr.Dataset:
+    """Return a slice with |u| in place of u, and the share that ends upslope, if u has signs."""
+    if not has_signed_displacements(data.attrs):
+        return data
+    share = {}
+    if DISPLACEMENT in data:
+        moved = data[DISPLACEMENT]
+        sliding = max(int((moved.fillna(0.0) != 0.0).sum()), 1)
+        share = {UPSLOPE_SHARE: int((moved < 0.0).sum()) / sliding}
+    magnitudes = {
+        name: abs(data[name]).assign_attrs(data[name].attrs) for name in SIGNED if name in data
+    }
+    return data.assign(magnitudes).assign_attrs(share)
+
+
 def solve(
     data: xr.Dataset,
     names: Iterable[str],
@@ -72,7 +92,11 @@ def solve(
 ) -> xr.Dataset:
     """Solve the cells of a slice as its result was, or by another model or parameters; None: the model's estimate."""
     chosen = model or MODELS.from_attributes(data.attrs)
-    block = ("yield_coefficient",) if "yield_coefficient" in data.coords else _BLOCK
+    block: tuple[str, ...] = _BLOCK
+    if "yield_coefficient" in data.coords:
+        block = ("yield_coefficient",)
+    if slides_both_ways(chosen):
+        block += ("theta", "upslope_yield_acceleration")
     friction = ("decay_rate", "delta_mu", "minimum_friction") if isinstance(chosen, Mendez) else ()
     wanted = (*block, *friction, *WAVEFORM_INPUTS, *RECORD_INPUTS[1:])
     given = {name: _bare(data[name]) for name in wanted if name in data.coords} | changed
@@ -106,7 +130,9 @@ def thresholds(data: xr.Dataset, always: bool = False) -> xr.Dataset:
     """Accelerations of yield and of the mode limit (Eq. 7) of a slice, m/s², along the dimensions they depend on.
 
     ``yield_line`` and, but for Newmark's block where not `always`, ``limit_line``; NaN where the
-    block slides under its own weight.  None for a record: each of its pulses has its own peak.
+    block slides under its own weight.  None for a record: each of its pulses has its own peak.  For
+    a block that slides both ways ``yield_line`` is the smaller of Üy and Üy,up, and there are also
+    ``downslope_line``, Üy, and ``upslope_line``, −Üy,up.
     """
     if is_recorded(data) and "half_wave_peak" not in data:
         return xr.Dataset()
@@ -136,8 +162,21 @@ def boundaries(data: xr.Dataset, always: bool = False) -> xr.Dataset:
             undefined = has_flags(found["validity"], Validity.LIMIT_UNDEFINED)
             lines["limit_line"] = found["limiting_acceleration"].where(~undefined)
     lines["yield_line"] = onset
+    if has_signed_displacements(data.attrs):
+        upslope = _upslope_onset(data, onset)
+        lines["yield_line"] = xr.apply_ufunc(np.minimum, onset.reset_coords(drop=True), upslope)
+        lines["downslope_line"] = onset
+        lines["upslope_line"] = -upslope
     lines["rest_angle"] = xr.apply_ufunc(lambda ratio: np.degrees(np.arctan(ratio)), onset / g)
     return xr.Dataset(lines).reset_coords(drop=True)
+
+
+def _upslope_onset(data: xr.Dataset, onset: xr.DataArray) -> xr.DataArray:
+    """Return Üy,up of a block that slides both ways: as given, or by statics from Üy."""
+    if "upslope_yield_acceleration" in data.coords:
+        given: xr.DataArray = _bare(data["upslope_yield_acceleration"])
+        return given
+    return upslope_yield_acceleration(onset, _bare(data["theta"]), float(data.attrs["g"]))
 
 
 def newmark(data: xr.Dataset) -> xr.DataArray | None:

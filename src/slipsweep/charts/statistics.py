@@ -40,6 +40,7 @@ def draw_fragility(sheet: Sheet) -> Figure:
     """Curves of `exceedance_probability` of a slice, and the share of samples without a value, where there are any."""
     thresholds = sheet.data["threshold"]
     fixed = style.length_text(thresholds.item()) if thresholds.ndim == 0 else None
+    symbol = style.displacement_symbol(sheet.data.attrs)
     for panel in sheet.panels:
         panel.axes.grid(color="0.9")
         curves = panel.grid("exceedance_probability")
@@ -52,7 +53,7 @@ def draw_fragility(sheet: Sheet) -> Figure:
         if shares.any():
             dotted = panel.axes.plot(panel.xs, shares.max(axis=0), color="0.4", linestyle=":")
             sheet.legend["no value (share)"] = dotted[0]
-        given = "u > d" if fixed is None or sheet.y is None else f"u > {fixed}"
+        given = f"{symbol} > d" if fixed is None or sheet.y is None else f"{symbol} > {fixed}"
         panel.axes.set(ylim=(-0.02, 1.02), ylabel=f"probability of exceedance P({given})")
     return sheet.done()
 
@@ -65,7 +66,8 @@ def quantiles(result: Result, options: Options) -> Figure:
     everything = sheet.data["displacement_quantile"].values * 1000.0
     shares = np.atleast_1d(sheet.data["quantile"].values)
     for panel in sheet.panels:
-        floor = log_axis(panel.axes, everything, "permanent displacement (mm)", zeros=True)
+        label = f"{style.displacement_text(sheet.data.attrs)} (mm)"
+        floor = log_axis(panel.axes, everything, label, zeros=True)
         values = panel.grid("displacement_quantile", "quantile", panel.x) * 1000.0
         shown = np.maximum(values, floor)
         xs = panel.xs

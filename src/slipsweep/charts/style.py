@@ -16,7 +16,15 @@ from slipsweep.errors import InputError
 from slipsweep.model import variables
 from slipsweep.model.options import MODELS
 from slipsweep.model.units import quantity
-from slipsweep.model.variables import INTENSITY_MEASURES, PARAMETERS, SlidingMode, Validity
+from slipsweep.model.variables import (
+    INTENSITY_MEASURES,
+    PARAMETERS,
+    RESULTS,
+    SIGNED,
+    SlidingMode,
+    Validity,
+    has_signed_displacements,
+)
 from slipsweep.motion.waveforms import WAVEFORMS
 from slipsweep.published import check_equations
 
@@ -32,7 +40,11 @@ Look = dict[str, Any]
 
 #: Attributes of all results that charts show, by name; and of all that an axis can have.
 SHOWN = (
-    variables.LIMIT_RESULTS | variables.RECORD_RESULTS | variables.RESULTS | variables.STATISTICS
+    variables.LIMIT_RESULTS
+    | variables.REQUIRED_RESULTS
+    | variables.RECORD_RESULTS
+    | variables.RESULTS
+    | variables.STATISTICS
 )
 _ABOUT = (
     INTENSITY_MEASURES | SHOWN | PARAMETERS | {"displacement": variables.TOLERABLE_DISPLACEMENT}
@@ -228,6 +240,25 @@ def axis_label(name: str, options: Options) -> str:
     return f"{text} ({units})" if units else text
 
 
+def displacement_symbol(attributes: Mapping[Any, Any]) -> str:
+    """Symbol of the permanent displacement as it is drawn: |u| of a block that slides both ways."""
+    return "|u|" if has_signed_displacements(attributes) else "u"
+
+
+def displacement_text(attributes: Mapping[Any, Any]) -> str:
+    """Words for the permanent displacement as it is drawn, on axes."""
+    magnitude = "magnitude of the " if has_signed_displacements(attributes) else ""
+    return f"{magnitude}permanent displacement"
+
+
+def result_text(attributes: Mapping[Any, Any], name: str) -> str:
+    """Words for a result as it is drawn, on axes."""
+    if name in SIGNED and has_signed_displacements(attributes):
+        text = str(RESULTS[name]["long_name"]).removesuffix(", downslope")
+        return f"magnitude of the {text}"
+    return str(RESULTS[name]["long_name"])
+
+
 def with_unit(text: str, units: str) -> str:
     """A number and its unit: ``5°``, ``3 Hz``."""
     return f"{text}{units}" if units in ("", "°") else f"{text} {units}"
@@ -277,6 +308,7 @@ def caption(data: xr.Dataset, options: Options | None = None) -> str:
 _WORDS: dict[Any, str] = {
     "mendez": "Mendez et al. 2012",
     "newmark": NEWMARK,
+    "both": "sliding both ways",
     "monotone": "monotone rise",
     "literal": "literal rise",
     "eq12": "recoupling by Eq. 12",
@@ -298,6 +330,8 @@ def model_text(attributes: Mapping[Any, Any]) -> str:
 def short_model_text(attributes: Mapping[Any, Any]) -> str:
     """Name the model, its shaking and the estimated inputs, on one line."""
     model = _WORDS[MODELS.from_attributes(attributes).name]
+    if has_signed_displacements(attributes):
+        model += f", {_WORDS['both']}"
     # "Üy by Coulomb, λ by Eq. 6: estimated": the symbols alone
     inputs = re.sub(r" by (Coulomb|Eqs?\. [\d–]+)", "", str(attributes.get("friction_inputs", "")))
     inputs = plain(inputs.replace(": estimated", " estimated"))

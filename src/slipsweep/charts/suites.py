@@ -33,8 +33,6 @@ SCALING = {
     "mean_period": (0, 1),
 }
 
-_LABEL = "permanent displacement (mm)"
-
 _THIN: Look = {"color": "0.5", "linewidth": 0.7, "zorder": 1.8}
 _BAND: Look = {"facecolor": "#BBD7EA", "linewidth": 0, "zorder": 1.0}
 _EDGE: Look = {"color": style.BLUE, "linewidth": 1.0, "linestyle": (0, (5, 2)), "zorder": 2.2}
@@ -53,7 +51,7 @@ def motions(result: Result, options: Options) -> Figure:
     if options.show_cautions:  # upslope ones lie below the axis, as zeros do
         sheet.data["drawn"] = sheet.data[solved.DISPLACEMENT]
     for panel in sheet.panels:
-        floor = log_axis(panel.axes, _millimetres(sheet.data), _LABEL, zeros=True)
+        floor = log_axis(panel.axes, _millimetres(sheet.data), _label(sheet), zeros=True)
         lines = (
             panel.data["drawn"].transpose(*SUITE, panel.x, missing_dims="ignore").values * 1000.0
         )
@@ -84,7 +82,7 @@ def intensity(result: Result, options: Options) -> Figure:
     wide = there.size > 0 and there.max() > 3 * there.min()
     text = INTENSITY_MEASURES[measure]["long_name"].removesuffix(" as recorded")
     for panel, (xs, ys, polarity) in zip(sheet.panels, drawn, strict=True):
-        log_axis(panel.axes, displacements, _LABEL)
+        log_axis(panel.axes, displacements, _label(sheet))
         panel.axes.set(xscale="log" if wide else "linear", xlabel=f"{text} ({style.unit(measure)})")
         if wide:
             log_ticks(panel.axes.xaxis, there.max() / there.min())
@@ -137,7 +135,7 @@ def histogram(result: Result, options: Options) -> Figure:
         axes = panel.axes
         counts, _ = np.histogram(values[values > 0], edges)
         axes.bar(edges[:-1], counts, np.diff(edges), align="edge", gid="histogram", **_BARS)
-        axes.set(xscale="log", xlabel=_LABEL, ylabel="number of motions")
+        axes.set(xscale="log", xlabel=_label(sheet), ylabel="number of motions")
         log_ticks(axes.xaxis, edges[-1] / edges[0])
         axes.yaxis.set_major_locator(MaxNLocator(integer=True))
         found = suite_statistics(panel.data)
@@ -189,9 +187,18 @@ def _sheet(
 
 
 def draw_suite(
-    sheet: Sheet, axes: Axes, xs: Floats, lines: Floats, quantiles: Floats, floor: float = 0.0
+    sheet: Sheet,
+    axes: Axes,
+    xs: Floats,
+    lines: Floats,
+    quantiles: Floats,
+    floor: float = 0.0,
+    band: str = "16 to 84 %",
 ) -> None:
-    """A thin line for each motion of `lines`, and median and band (16, 50 and 84 %) over them, none below `floor`."""
+    """Draw a thin line for each motion of `lines`, and a band with median, none below `floor`.
+
+    `quantiles` are the lower end of the band, the median and the upper end.
+    """
     lines = np.maximum(lines, floor).reshape(-1, xs.size)
     quantiles = np.maximum(quantiles, floor)
     axes.fill_between(xs, quantiles[0], quantiles[2], gid="band", **_BAND)
@@ -201,9 +208,7 @@ def draw_suite(
         axes.plot(xs, edge, gid="edge", **_EDGE)
     plot_curve(axes, xs, quantiles[1], gid="median", **_MEDIAN)
     sheet.legend["median"] = Line2D([], [], **_MEDIAN)
-    sheet.legend["16 to 84 %"] = Patch(
-        facecolor=_BAND["facecolor"], edgecolor=style.BLUE, linestyle="--"
-    )
+    sheet.legend[band] = Patch(facecolor=_BAND["facecolor"], edgecolor=style.BLUE, linestyle="--")
     if len(lines):
         sheet.legend["a motion"] = Line2D([], [], **_THIN)
 
@@ -220,6 +225,11 @@ def _band(data: xr.Dataset, x: str) -> Floats:
         np.asarray(suite_statistics(data)["displacement_quantile"].transpose("quantile", x))
         * 1000.0
     )
+
+
+def _label(sheet: Sheet) -> str:
+    """Label of an axis of displacements."""
+    return f"{style.displacement_text(sheet.data.attrs)} (mm)"
 
 
 def _millimetres(data: xr.Dataset) -> Floats:

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from slipsweep.cli.options import Large, displacements
 from slipsweep.errors import InputError
@@ -33,9 +33,13 @@ def write_outputs(
     overwrite: bool,
     table: "xr.Dataset",
     recorded: "Record | None" = None,
+    look: Mapping[str, Any] | None = None,
     **texts: Callable[[], str],
 ) -> None:
-    """Write each output: the text of its ending, a netCDF file (with the record that is the input), or the chart."""
+    """Write each output: the text of its ending, a netCDF file, or the chart.
+
+    The record that is the input goes into the netCDF file; `look` has options of the chart.
+    """
     from slipsweep.files import netcdf
 
     figure = None
@@ -53,7 +57,7 @@ def write_outputs(
             else:
                 from slipsweep.charts import kinds
 
-                figure = figure or kinds.figure_of(table)  # drawn once
+                figure = figure or kinds.figure_of(table, **(look or {}))  # drawn once
                 kinds.save(figure, temporary, path.suffix)
 
 

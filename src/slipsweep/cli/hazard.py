@@ -8,6 +8,7 @@ from slipsweep.cli.common import FIGURES, echo
 from slipsweep.cli.options import command, written
 from slipsweep.errors import InputError
 from slipsweep.files import outputs
+from slipsweep.model import variables
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -121,7 +122,7 @@ def hazard(
     last = min(high, end)
     if beside is None:
         pooled = rates.attrs["suite_dimensions"].replace(" ", " and ")
-        echo(f"P(u > d | PGA): share over {pooled}")
+        echo(f"{_chance(rates)[:-1]} | PGA): share over {pooled}")
         ends = f"amplitudes of the result {low:.4g} to {high:.4g} g"
         echo(f"{ends}, hazard curve {start:.4g} to {end:.4g} g")
     else:
@@ -158,12 +159,19 @@ def hazard(
     echo(*rates.attrs.get("conditions", "").splitlines(), *paths)
 
 
+def _chance(rates: "xr.Dataset") -> str:
+    """Probability of exceedance in symbols."""
+    symbol = "|u|" if variables.has_signed_displacements(rates.attrs) else "u"
+    return f"P({symbol} > d)"
+
+
 def _suite_notes(
     rates: "xr.Dataset", first: float, last: float, first_end: str
 ) -> "dict[str, xr.DataArray]":
     """Sentences about the rates of a suite or of samples, and where they hold."""
     rate, held, omitted = (rates[name] for name in ("annual_rate", "held_rate", "omitted_rate"))
     axis = "the axis amplitude of the sweep" if first_end == "sweep" else "the hazard curve"
+    chance = _chance(rates)
     missing = rates["valueless_share"]
     what = "samples" if "samples" in rates.attrs["suite_dimensions"] else "motions"
     unstable = (
@@ -175,12 +183,14 @@ def _suite_notes(
         "without an annual rate: fewer than two amplitudes have a value": rate.isnull(),
         "annual rate 0: the displacement is not exceeded at any amplitude of the result": rate
         == 0.0,
-        f"above {last:.4g} g P(u > d) is taken as it is there: to compute it, extend {axis}": held
+        f"above {last:.4g} g {chance} is taken as it is there: to compute it, extend {axis}": held
         > _MUCH * rate,
         f"below {first:.4g} g nothing is counted: to compute it, begin the axis amplitude lower": omitted
         > _MUCH * rate,
-        "P(u > d) grows much from one amplitude to the next: the rates may be wrong by the factors above; put more "
-        "values on the axis amplitude": (rates["upper_rate"] > 2.0 * rates["lower_rate"])
+        f"{chance} grows much from one amplitude to the next: the rates may be wrong by the "
+        "factors above; put more values on the axis amplitude": (
+            rates["upper_rate"] > 2.0 * rates["lower_rate"]
+        )
         & (held < rate),
     }
 

@@ -1,4 +1,4 @@
-"""`slipsweep limit`: the amplitude at which a tolerable displacement is reached."""
+"""`slipsweep limit`: the amplitude, or the strength, for a tolerable displacement."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -8,8 +8,9 @@ from slipsweep.cli.common import FIGURES, echo
 from slipsweep.cli.options import Large, Text, Texts, read, written
 from slipsweep.errors import InputError
 from slipsweep.files import outputs
+from slipsweep.model.parameters import check_choice
 from slipsweep.model.units import quantity
-from slipsweep.model.variables import LimitStatus
+from slipsweep.model.variables import REQUIRED_STRENGTHS, LimitStatus, StrengthStatus
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,30 +21,48 @@ _MOST_POINTS = 12
 _MOST_MOTIONS = 60
 
 
+LIMIT = options.Panel("Limit")
+
+
 @options.command(
-    "Compute", "slipsweep limit design_chart.nc --displacement 50mm -o limit.nc -o limit.png"
+    "Compute",
+    "slipsweep limit design_chart.nc --displacement 50mm -o limit.nc -o limit.png",
+    "slipsweep limit suite.toml -d 50mm --of yield_coefficient -o strength.nc -o strength.png",
 )
 def limit(
     *,
     sweep: Annotated[
-        Path, read("OUT.nc|SWEEP.toml", "A result or sweep file: its model and axes but amplitude.")
+        Path,
+        read(
+            "OUT.nc|SWEEP.toml",
+            "A result or sweep file: its model, and its axes but the one that is solved for.",
+        ),
     ],
     displacement: Annotated[list[str], options.LENGTH],
+    of: Annotated[
+        Text,
+        LIMIT(
+            "What to solve for: amplitude, or the strength of Newmark's block: yield_coefficient, "
+            "mu_s, phi.  [default: amplitude]",
+            "NAME",
+        ),
+    ] = None,
     output: Annotated[
         Texts, written("Write .nc, .zarr, .png, .svg or .pdf; may be repeated.", "FILE|URL")
     ] = None,
     maximum_amplitude: Annotated[
         Text,
-        options.Panel("Limit")("End of the search: 2g, 15 (m/s²).  [default: 5g]", "ACCELERATION"),
+        LIMIT("End of the search: 2g, 15 (m/s²).  [default: 5g]", "ACCELERATION"),
     ] = None,
+    equations: options.Equations = None,
+    magnitude: options.Magnitude = None,
     large: Large,
 ) -> None:
-    """Find the limiting PGA for a tolerable displacement.
+    """Find the limiting PGA, or the required strength, for a tolerable displacement.
 
     Over all other axes of a sweep; solved again to rounding, not interpolated from the result.
     """
     from slipsweep.files import jobs, opening, spec
-    from slipsweep.grid.resources import grid_text
 
     results = [one for one in output or () if Path(one).suffix in (".nc", ".zarr")]
     if len(results) > 1:
@@ -53,6 +72,12 @@ def limit(
             raise InputError(
                 f"--{name}: needs -o OUT.nc, whose chunks are solved and written one after the other"
             )
+    solved_for = check_choice("--of", of or "amplitude", ("amplitude", *REQUIRED_STRENGTHS))
+    if solved_for != "amplitude" and maximum_amplitude is not None:
+        raise InputError(f"--maximum-amplitude: not with --of {solved_for}")
+    beside = options.compared(equations, magnitude)
+    if beside and solved_for != "yield_coefficient":
+        raise InputError("--equations: only with --of yield_coefficient")
     checked = spec.load(sweep)
     named = [Path(one) for one in output or () if one not in results]
     figures = outputs.check_outputs(
@@ -66,7 +91,11 @@ def limit(
         else quantity("--maximum-amplitude", maximum_amplitude, "m s-2", g)
     )
     # one is one number; several are a dimension, in order and without repetition
-    job = jobs.limit_job(checked, lengths if len(displacement) > 1 else lengths[0], highest)
+    targets = lengths if len(displacement) > 1 else lengths[0]
+    if solved_for == "amplitude":
+        job = jobs.limit_job(checked, targets, highest)
+    else:
+        job = jobs.strength_job(checked, targets, solved_for)
     if results:
         table = opening.read_result(common.run_job(job, opening.place_of(results[0]), large).path)
     else:
@@ -76,9 +105,25 @@ def limit(
         ):
             table = job.plan.solve(progress)
     labelled = table.assign_coords(label=("case", list(job.labels))) if job.labels else table
-    common.write_outputs(figures, large.overwrite, labelled)
+    look = {"equations": beside, "magnitude": magnitude}
+    common.write_outputs(figures, large.overwrite, labelled, look=look)
     if large.quiet:
         return
+    if solved_for == "amplitude":
+        _print_limits(table, g)
+    else:
+        _print_strengths(table, solved_for)
+        if beside:
+            from slipsweep.studies.published_strength import strength_lines
+
+            echo(*strength_lines(table, beside, magnitude))
+    echo(*(output or ()))
+
+
+def _print_limits(table: "xr.Dataset", g: float) -> None:
+    """Print the limit amplitudes: their range, quantiles under a suite, how they were found."""
+    from slipsweep.grid.resources import grid_text
+
     limits = table["limit_amplitude"]
     status = table["limit_status"]
     echo(
@@ -100,13 +145,16 @@ def limit(
     )
     if limits.sizes.get("motion", 1) > 1:
         _summarize_suite(table, g)
-    shares = {one: float((status == one).mean()) for one in LimitStatus}
-    rows = (
-        f"  {one.name.lower():<24}{share:7.2%}  {one.text}"
-        for one, share in shares.items()
-        if share
-    )
-    echo("status (limit_status):", *rows, *(output or ()))
+    _print_status(status, LimitStatus)
+
+
+def _print_status(status: "xr.DataArray", codes: type[LimitStatus | StrengthStatus]) -> None:
+    """Print the shares of the codes of a status."""
+    echo(f"status ({status.name}):")
+    for code in codes:
+        share = float((status == code).mean())
+        if share:
+            echo(f"  {code.name.lower():<24}{share:7.2%}  {code.text}")
 
 
 def _summarize_suite(table: "xr.Dataset", g: float) -> None:
@@ -137,3 +185,64 @@ def _summarize_suite(table: "xr.Dataset", g: float) -> None:
         )
         echo("limits of the motions, g, at each grid point:")
         echo(each.to_string(header=False, float_format="{:.4g}".format, na_rep="none"))
+
+
+def _print_strengths(table: "xr.Dataset", of: str) -> None:
+    """Print the required strengths: their range, quantiles of a suite or of samples, how found."""
+    from slipsweep.grid.resources import grid_text
+
+    name = f"required_{of}"
+    units = REQUIRED_STRENGTHS[of]["units"].removeprefix("1")
+    if name in table:
+        strengths = table[name]
+        sizes = {str(dim): size for dim, size in strengths.sizes.items()}
+        echo(f"{strengths.size} required strengths ({grid_text(sizes) or 'one cell'})")
+        if strengths.notnull().any():
+            for text, value in (
+                ("smallest", strengths.min()),
+                ("median", strengths.median()),
+                ("largest", strengths.max()),
+            ):
+                echo(f"  {text:<24}{of} {value.item():.6g} {units}".rstrip())
+    lengths = ", ".join(f"{length:.6g}" for length in table["displacement"].values.flat)
+    echo(f"displacement {lengths} m")
+    if "criterion" in table.attrs:
+        echo(f"by the {table.attrs['criterion']}")
+    echo(f"inputs: {table.attrs['friction_inputs']}")
+    if "always_within_count" in table:
+        _summarize_strengths(table, name)
+    if name in table:
+        _print_status(table["required_status"], StrengthStatus)
+
+
+def _summarize_strengths(table: "xr.Dataset", name: str) -> None:
+    """Print quantiles of a suite or of samples at every grid point, and each motion's strength."""
+    import numpy as np
+    import pandas as pd
+
+    from slipsweep.studies.suite_statistics import point_names, suite_dims
+
+    quantiles = table[f"{name}_quantile"]
+    grid = {dim: size for dim, size in quantiles.sizes.items() if dim != "quantile"}
+    factors = {"amplitude": 1.0 / float(table.attrs["g"])}
+    points = point_names(table, grid, factors)
+    shares = [
+        "median" if share == 0.5 else f"{100.0 * share:.3g} %" for share in table["quantile"].values
+    ]
+    values = quantiles.transpose(*grid, "quantile").values.reshape(len(points), -1)
+    rows = pd.DataFrame(values, points, shares).replace(np.inf, np.nan)
+    rows["always"] = table["always_within_count"].transpose(*grid).values.ravel()
+    rows["never"] = table["never_within_count"].transpose(*grid).values.ravel()
+    runs = str(table.attrs.get("pooled", ""))
+    if "samples" in table.attrs:
+        runs = f"{runs} x {table.attrs['samples']} samples".removeprefix(" x ")
+    echo(f"quantiles of {name} over {runs} (PGA in g):")
+    echo(rows.head(_MOST_POINTS).to_string(float_format="{:.4g}".format, na_rep="none"))
+    if len(points) > _MOST_POINTS:
+        echo(f"and {len(points) - _MOST_POINTS} grid points more")
+    if name in table and table[name].size <= _MOST_MOTIONS:
+        suite = {dim: table.sizes[dim] for dim in suite_dims(table[name])}
+        each = table[name].transpose(*suite, *grid).values.reshape(-1, len(points))
+        echo(f"{name} of the motions, at each grid point:")
+        motions = pd.DataFrame(each, point_names(table, suite))
+        echo(motions.to_string(header=False, float_format="{:.4g}".format, na_rep="none"))

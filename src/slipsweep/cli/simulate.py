@@ -32,6 +32,10 @@ class Typed:
     yield_coefficient: Annotated[
         float | None, RARE("Üy/g of Newmark's block, instead of --theta and --mu-s.")
     ] = None
+    upslope_yield_acceleration: Annotated[
+        Text,
+        RARE("Yield acceleration upslope, with --sliding both (default: by statics).", "VALUE"),
+    ] = None
     decay_rate: Annotated[float | None, BLOCK("Friction decay λ (default: Eq. 6 at the peak).")] = (
         None
     )
@@ -148,7 +152,12 @@ def simulate(
         return
     if recorded is not None:
         echo(f"record                  {recorded.summary()}")
-    echo(f"permanent displacement  {table['permanent_displacement'].item():.6g} m")
+    for name in variables.SIGNED:
+        if name in table:
+            echo(f"{name.replace('_', ' '):<23} {table[name].item():.6g} m")
+    if {*variables.EXTREMES} <= {*table}:
+        extent = table["largest_displacement"] - table["smallest_displacement"]
+        echo(f"{'clearance':<23} {extent.item():.6g} m")
     echo(f"peak relative velocity  {table['peak_relative_velocity'].item():.6g} m/s")
     if "sliding_mode" in table:
         echo(

@@ -19,10 +19,12 @@ from slipsweep.files.selection import axis_labels, axis_numbers
 from slipsweep.model.variables import (
     PARAMETERS,
     RESULTS,
+    SIGNED,
     STATISTIC_COORDINATES,
     STATISTICS,
     STRENGTHS,
     UNFLAGGED_TEXT,
+    has_signed_displacements,
 )
 from slipsweep.studies.suite_statistics import suite_statistics
 
@@ -31,6 +33,7 @@ from slipsweep.studies.suite_statistics import suite_statistics
 LAYERS = {
     "permanent_displacement": "displacement",
     "newmark_displacement": "Newmark's displacement",
+    "clearance": "clearance",
     "displacement_quantile": "quantile of displacement",
     "mean_displacement": "mean displacement",
     "exceedance_probability": "probability of exceeding",
@@ -143,7 +146,10 @@ def read_excerpt(path: Path, cells: int) -> Excerpt:
             )
         if name == "validity" and table[name].isnull().any():
             raise InputError(f"{path}: validity: {UNFLAGGED_TEXT}")
-        table[name] = table[name].astype(SHOWN[name]).assign_attrs((STATISTICS | RESULTS)[name])
+        described = dict((STATISTICS | RESULTS)[name])
+        if name in SIGNED and has_signed_displacements(result.attrs):
+            described["long_name"] += "; colours show its magnitude"
+        table[name] = table[name].astype(SHOWN[name]).assign_attrs(described)
     labels = {dim: axis_labels(table, dim) for dim in lengths if dim not in PARAMETERS}
     table = xr.Dataset(
         {name: table[name].variable for name in names}, _coordinates(path, table), result.attrs

@@ -43,7 +43,7 @@ def decades(excerpt: Excerpt) -> tuple[int, int]:
         for name in excerpt.layers
         if scale_of(name) == "displacement"
     ]
-    values = np.concatenate([np.zeros(0), *lengths])
+    values = np.abs(np.concatenate([np.zeros(0), *lengths]))
     positive = values[np.isfinite(values) & (values > 0.0)]
     if positive.size == 0:
         return 0, 1

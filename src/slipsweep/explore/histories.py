@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from slipsweep.explore.excerpt import Excerpt, evenly, thinned_lengths
 from slipsweep.grid import engine, plans, solvers
 from slipsweep.grid.inputs import Inputs, Problem
-from slipsweep.kernels.block import Cell
-from slipsweep.kernels.history import History, fill_history
+from slipsweep.kernels.history import History
 from slipsweep.model.options import MODELS, Cycle
 from slipsweep.model.variables import VALUELESS
 from slipsweep.motion.cutting import path_of_waveform
@@ -95,20 +94,18 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
     has_values = (plan.solve()["validity"].variable.set_dims(left).values & VALUELESS) == 0
     problem = Problem(model, motion, Cycle())
     path = path_of_waveform(motion)
-    fields = engine.cell_inputs(problem, plan.coords)
-    cells = {
-        name: fields.get(name, xr.Variable((), math.nan)).set_dims(left).values
-        for name in Cell._fields
+    fields = {
+        name: xr.as_variable(values).set_dims(left).values
+        for name, values in engine.cell_inputs(problem, plan.coords).items()
     }
-    options = solvers.options_of(problem, wants_peak=True)
     phase = np.linspace(0.0, 2.0 * math.pi * cycles, points)
     ground = np.zeros(points)
     values = np.zeros((*left.values(), len(_COLUMNS), points), np.int16)
     scale = np.full((*left.values(), len(_COLUMNS)), np.nan, np.float32)
     samples = History(*np.empty((len(History._fields), points)))
     for at in np.ndindex(*left.values()):
-        cell = Cell(*(float(one[at]) for one in cells.values()))
-        fill_history(cell, options, path, phase, samples)
+        cell = {name: float(values[at]) for name, values in fields.items()}
+        solvers.fill_history(problem, cell, path, phase, samples)
         columns = np.array([getattr(samples, name) for name in _COLUMNS])
         if has_values[at] and np.isfinite(columns).all():
             largest = np.abs(columns).max(axis=1)
@@ -117,6 +114,6 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
                 values[at] = np.where(
                     largest[:, None] > 0.0, columns / largest[:, None] * 32767.0, 0.0
                 ).round()
-        if cell.amplitude > 0.0:
-            ground = samples.ground_acceleration / cell.amplitude
+        if cell["amplitude"] > 0.0:
+            ground = samples.ground_acceleration / cell["amplitude"]
     return Histories(keep, phase, ground, values, scale, cycles)

@@ -126,7 +126,7 @@
   }
   function mark(what, i, j) { // the colour of pixel (i, j); told apart in grey too
     if (what === "stuck") return i % 8 === 0 && j % 8 === 0 ? GREY : STUCK;
-    if (what === "upslope") return i % 6 === 0 ? HATCH : UPSLOPE;
+    if (what === "upslope") return i % 6 === 0 ? HATCH : meta.signed ? CLEAR : UPSLOPE;
     if (what === "missing") return (i + j) % 10 === 0 || (i - j + 100000) % 10 === 0 ? GREY : WHITE;
     if (what === "flagged") return (i + j) % 9 === 0 ? HATCH : CLEAR;
     if (what === "boundary") return j === 8 ? LINE : WHITE;
@@ -147,7 +147,7 @@
     for (let j = 0; j < ny; j++) {
       for (let i = 0; i < nx; i++) {
         const index = cellAt(i, j), at = j * nx + i, u = value(layer.name, index);
-        shades[at] = layer.scale === "probability" ? u : u > 0 ? u * 1000 : NaN;
+        shades[at] = layer.scale === "probability" ? u : u > 0 ? u * 1000 : u < 0 && meta.signed ? -u * 1000 : NaN;
         kinds[at] = kind(index);
         modes[at] = lined ? value("sliding_mode", index) : 0;
         if (place(index) >= 0) { held.x.push(dims[X].values[i]); held.y.push(dims[Y].values[j]); }
@@ -394,7 +394,8 @@
   }
 
   // A cell that slides, of which no flag says that its value is not to be relied on.
-  const isSound = (index) => value(layer.name, index) > 0 && !(arrays.validity && value("validity", index) & meta.unsound);
+  const slides = (u) => u > 0 || (meta.signed && u < 0);
+  const isSound = (index) => slides(value(layer.name, index)) && !(arrays.validity && value("validity", index) & meta.unsound);
 
   async function start() {
     element("history").hidden = !store;

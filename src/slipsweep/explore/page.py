@@ -208,6 +208,7 @@ def _contents(
             known.flags_of(known.FlagKind.CAUTION) | known.flags_of(known.FlagKind.NO_VALUE)
         ),
         "g": float(table.attrs["g"]),
+        "signed": known.has_signed_displacements(table.attrs),
         "histories": histories
         and {
             "keep": {dim: indices.tolist() for dim, indices in histories.keep.items()},

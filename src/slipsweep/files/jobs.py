@@ -16,6 +16,7 @@ from slipsweep.files.motions import digest_of
 from slipsweep.files.netcdf import described
 from slipsweep.files.spec import SweepSpec, named
 from slipsweep.grid.plans import Plan
+from slipsweep.model.options import slides_both_ways
 from slipsweep.model.variables import RESULT_DTYPES, STRENGTHS
 
 #: Attribute by which a run knows whether a file is its own.
@@ -115,3 +116,27 @@ def limit_job(
         )
     options = {"--displacement": displacement, "--maximum-amplitude": maximum_amplitude}
     return Job(spec, plan, "Amplitudes at which a tolerable displacement is reached", options)
+
+
+def strength_job(spec: SweepSpec, displacement: float | list[float], of: str) -> Job:
+    """Return the job of `slipsweep limit --of`: strengths that displacements (m) require."""
+    from slipsweep.studies import strength  # imports numba
+
+    # the strength is solved for; without θ the yield coefficient needs no interface
+    replaced = dict.fromkeys(("mu_s", "phi", "yield_acceleration", "yield_coefficient"))
+    both_ways = slides_both_ways(spec.model)
+    if of == "yield_coefficient" and not both_ways:
+        replaced |= dict.fromkeys(("theta",))
+    replaced |= dict.fromkeys(("structure_frequency", "decay_rate", "delta_mu"))
+    replaced |= dict.fromkeys(("minimum_friction",))
+    with named(spec.source):
+        plan = strength.plan_strength(
+            displacement,
+            replace(spec.inputs, **replaced),
+            of=of,
+            excitation=spec.excitation,
+            model=spec.model,
+            sampling=spec.sampling,
+        )
+    options = {"--displacement": displacement, "--of": of}
+    return Job(spec, plan, strength.TITLE, options)

@@ -27,7 +27,8 @@ def described(
     for name, one in dict(found.variables).items():
         if one.dtype.kind == "U":  # of any length
             found[name] = found[name].astype(object)
-        if one.attrs.get("ancillary_variables") not in found.variables:
+        ancillary = str(one.attrs.get("ancillary_variables", "")).split()
+        if not {*ancillary} <= found.variables.keys():
             found[name].attrs.pop("ancillary_variables", None)
     if recorded is not None:
         found = found.assign(embedded(recorded))

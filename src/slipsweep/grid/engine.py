@@ -38,7 +38,7 @@ _MOST_TILE = 65536
 _POWERS = {
     "permanent_displacement": 2,
     "newmark_displacement": 2,
-    **dict.fromkeys(known.EXTREMES, 2),
+    **dict.fromkeys(known.BOTH_WAYS, 2),
     "peak_relative_velocity": 1,
 }
 
@@ -134,7 +134,7 @@ def amplitudes(request: Request) -> Variables:
     results = request.results()
     for where, part in motions(request):
         for one in results.values():
-            one[where] = cell_inputs(part.problem, part.inputs)["amplitude"]
+            one[where] = motion_factor(part.problem, part.inputs)
         part.count(part.cells)
     return results
 
@@ -170,12 +170,8 @@ def cell_inputs(problem: Problem, inputs: Mapping[str, Any]) -> dict[str, Any]:
     acceleration.
     """
     given = dict(inputs)
-    if isinstance(record := problem.excitation, Record):
-        given["amplitude"] = strength_factor(record.times, record.acceleration, inputs)
-    elif "displacement_amplitude" in inputs:
-        given["amplitude"] = peak_acceleration(
-            inputs["displacement_amplitude"], inputs["frequency"]
-        )
+    if isinstance(problem.excitation, Record) or "displacement_amplitude" in inputs:
+        given["amplitude"] = motion_factor(problem, inputs)
     if "yield_coefficient" in inputs:
         given["yield_acceleration"] = inputs["yield_coefficient"] * problem.model.g
     if "theta" in inputs:
@@ -184,6 +180,15 @@ def cell_inputs(problem: Problem, inputs: Mapping[str, Any]) -> dict[str, Any]:
     if slides_both_ways(problem.model):
         fields["upslope_yield_acceleration"] = upslope_yield_acceleration(given, problem.model.g)
     return fields
+
+
+def motion_factor(problem: Problem, inputs: Mapping[str, Any]) -> Any:
+    """Return A of a waveform, m/s², or the factor on the acceleration of a record."""
+    if isinstance(record := problem.excitation, Record):
+        return strength_factor(record.times, record.acceleration, inputs)
+    if "displacement_amplitude" in inputs:
+        return peak_acceleration(inputs["displacement_amplitude"], inputs["frequency"])
+    return inputs["amplitude"]
 
 
 def upslope_yield_acceleration(given: Mapping[str, Any], g: float) -> Any:

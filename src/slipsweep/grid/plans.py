@@ -169,16 +169,12 @@ def plan_sweep(
     results = known.RESULTS if is_wave else known.RECORD_RESULTS
     default: tuple[str, ...] = known.DEFAULT_RESULTS if is_wave else known.DEFAULT_RECORD_RESULTS
     default += ("motion_factor",) if isinstance(problem.excitation, Suite) else ()
-    has_extremes = options.slides_both_ways(problem.model) and not isinstance(
-        problem.solver, options.Step
-    )
-    default += tuple(known.EXTREMES) if has_extremes else ()
+    slides_back = options.slides_both_ways(problem.model)
+    default += tuple(known.EXTREMES) if slides_back else ()
     wanted = default if variables is None else check_choices("variables", variables, results)
-    for name in known.EXTREMES:
-        if name in wanted and not has_extremes:
-            raise InputError(
-                f"variables: {name}: only with model = Newmark(sliding='both') and solver = 'cycle'"
-            )
+    for name in known.BOTH_WAYS:
+        if name in wanted and not slides_back:
+            raise InputError(f"variables: {name}: only with model = Newmark(sliding='both')")
     solved = grid_inputs.inputs_of(problem, coords)
     drive = _drive(solved)
     if "displacement_amplitude" in drive:

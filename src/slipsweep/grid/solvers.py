@@ -8,8 +8,9 @@ import numpy as np
 
 from slipsweep.grid.inputs import Problem
 from slipsweep.kernels import block as physics
-from slipsweep.kernels import newmark, step
+from slipsweep.kernels import history, newmark, newmark_record, step
 from slipsweep.kernels.grid import CELL, find_parameters
+from slipsweep.kernels.newmark_history import fill_newmark_history
 from slipsweep.kernels.sine.solve import solve_sine
 from slipsweep.kernels.walk import solve_walk, workspace_of
 from slipsweep.model.options import Mendez, Newmark, Step, slides_both_ways
@@ -35,6 +36,9 @@ ROWS["newmark_displacement"] = ROWS["permanent_displacement"]
 
 NEWMARK_ROWS = {name: row for row, name in enumerate(newmark.RESULTS)}
 NEWMARK_ROWS["newmark_displacement"] = NEWMARK_ROWS["permanent_displacement"]
+
+STEP_ROWS = {name: row for row, name in enumerate(step.RESULTS)}
+STEP_ROWS["newmark_displacement"] = STEP_ROWS["permanent_displacement"]
 
 #: The same of `find_parameters`.
 _PARAMETER_ROWS = {
@@ -90,9 +94,9 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
 
     if isinstance(problem.solver, Step):
         stepper = stepper_of(problem, options, polarity)
-        no_history = step.history_of(np.empty(0), np.empty(0))
+        no_log = np.empty(0, step.LOG)
         return Solver(
-            lambda cells, results: stepper(cells, no_history, results), ROWS, step.STEP_CELL
+            lambda cells, results: stepper(cells, no_log, results), STEP_ROWS, step.STEP_CELL
         )
     if isinstance(motion, Record):
         path = cutting.path_of_record(motion, polarity)
@@ -104,9 +108,12 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
 
 
 def newmark_solver(problem: Problem, options: physics.Options, polarity: float) -> Solver:
-    """Return the solver of Newmark's block: its own kernel, or under a plain sine the batches."""
-    assert not isinstance(problem.excitation, Suite)
-    path = path_under(problem.excitation, polarity)
+    """Return the solver of Newmark's block: its own kernels, or under a plain sine the batches."""
+    motion = problem.excitation
+    assert not isinstance(motion, Suite)
+    if isinstance(motion, Record):
+        return newmark_record_solver(motion, options.g, polarity)
+    path = path_under(motion, polarity)
 
     def solve(cells: np.ndarray, results: np.ndarray) -> None:
         blocks = np.zeros(1, newmark.BLOCK)
@@ -124,8 +131,19 @@ def newmark_solver(problem: Problem, options: physics.Options, polarity: float) 
         results[:, left] = solved[: results.shape[0]]
 
     # a batch solves several cells at once, the kernel one by one
-    if is_plain_sine(problem.excitation) and not slides_both_ways(problem.model):
+    if is_plain_sine(motion) and not slides_both_ways(problem.model):
         return Solver(solve_in_batches, ROWS)
+    return Solver(solve, NEWMARK_ROWS, newmark.NEWMARK_CELL)
+
+
+def newmark_record_solver(record: Record, g: float, polarity: float) -> Solver:
+    """Return the solver of Newmark's block under a record."""
+    samples = cutting.samples_of_record(record, polarity)
+
+    def solve(cells: np.ndarray, results: np.ndarray) -> None:
+        blocks = np.zeros(1, newmark.BLOCK)
+        newmark_record.solve_newmark_record(cells, g, samples, blocks, results)
+
     return Solver(solve, NEWMARK_ROWS, newmark.NEWMARK_CELL)
 
 
@@ -136,10 +154,35 @@ def path_under(motion: Waveform | Record, polarity: float) -> Path:
     return cutting.path_of_waveform(motion)
 
 
+def fill_history(
+    problem: Problem,
+    fields: Mapping[str, Any],
+    path: Path,
+    phases: np.ndarray,
+    samples: history.History,
+) -> None:
+    """Fill a history from event to event, at increasing phases (of a record: times at scale 1).
+
+    `fields` are those of a cell, single numbers (`engine.cell_inputs`).
+    """
+    options = options_of(problem, wants_peak=True)
+    if isinstance(problem.model, Newmark):
+        cells = np.full(1, math.nan, newmark.NEWMARK_CELL)
+        for name in newmark.NEWMARK_CELL.names or ():
+            cells[name] = fields.get(name, math.nan)
+        fill_newmark_history(cells, options.g, options.cycles, path, phases, samples)
+        return
+    cell = physics.Cell(*(float(fields.get(name, math.nan)) for name in physics.Cell._fields))
+    history.fill_history(cell, options, path, phases, samples)
+
+
 def stepper_of(
     problem: Problem, options: physics.Options, polarity: float
-) -> Callable[[np.ndarray, step.History, np.ndarray], Any]:
-    """What solves cells by steps: cells, of dtype `step.STEP_CELL`, a history and results."""
+) -> Callable[[np.ndarray, np.ndarray, np.ndarray], Any]:
+    """What solves cells by steps: cells, of dtype `step.STEP_CELL`, a log and results.
+
+    It returns the block of the last cell.
+    """
     assert isinstance(problem.solver, Step)
     rule = RULES[problem.solver.rule]
     count = problem.solver.steps_per_cycle
@@ -149,12 +192,10 @@ def stepper_of(
     path = path_under(problem.excitation, polarity)
     steps = step.steps_of(path, rule, count, on_piece)
 
-    def solve(cells: np.ndarray, history: step.History, results: np.ndarray) -> None:
+    def solve(cells: np.ndarray, log: np.ndarray, results: np.ndarray) -> Any:
         blocks = step.blocks_of(rule, count, on_piece)
-        step.solve_steps(cells, options, path, blocks, steps, history, results)
-        if slides_both_ways(problem.model):  # a displacement upslope is no caution there
-            validity = results[ROWS["validity"]].astype(np.int64)
-            results[ROWS["validity"]] = validity & ~physics.UPSLOPE
+        step.solve_steps(cells, options, path, blocks, steps, log, results)
+        return blocks[0]
 
     return solve
 
@@ -174,6 +215,8 @@ def cost_of(problem: Problem) -> int:
         return 1 if is_plain_sine(motion) and not slides_both_ways(problem.model) else 16
     records = motion if isinstance(motion, Suite) else (motion,)
     samples = max(record.times.size for record in records)
+    if isinstance(problem.model, Newmark) and not steps:
+        return max(8, samples // 4096)
     return max(64, samples // 8) * math.ceil(max(steps, 1) / STEPS_PER_SAMPLE)
 
 

@@ -181,6 +181,6 @@ def _digest_of_sources() -> str:
     sources = [
         path for room in ("model", "jit", "kernels") for path in (package / room).rglob("*.py")
     ]
-    sources += [package / "motion" / name for name in ("pieces.py", "paths.py")]
+    sources += [package / "motion" / name for name in ("pieces.py", "paths.py", "samples.py")]
     contents = (path.read_bytes() for path in sorted(sources))
     return hashlib.sha256(b"".join(contents)).hexdigest()[:16]

@@ -30,6 +30,9 @@ NEWMARK_CELL = np.dtype(
     (np.record, [(name, "f8") for name in (*DOWNSLOPE_FIELDS, "upslope_yield_acceleration")])
 )
 
+#: Most slides along a piece: up to a stop, the other way, and up to a stop again.
+MOST_PARTS = 3
+
 #: A block and its motion up to now.
 BLOCK = np.dtype(
     (
@@ -46,12 +49,21 @@ BLOCK = np.dtype(
             ("smallest_displacement", "f8"),
             ("slips", "f8"),
             ("lost", "f8"),  # what rounding has taken from W (Kahan's sum)
+            # slides along the piece gone through last: their number, and of each the τ of its
+            # start and end, its side, and speed and W at its start
+            ("parts", "i8"),
+            ("part_start", "f8", (MOST_PARTS,)),
+            ("part_end", "f8", (MOST_PARTS,)),
+            ("part_side", "f8", (MOST_PARTS,)),
+            ("part_speed", "f8", (MOST_PARTS,)),
+            ("part_displacement", "f8", (MOST_PARTS,)),
         ],
     )
 )
 
-#: A record of `BLOCK`; its fields have no types that mypy knows.
+#: Records of `BLOCK` and `NEWMARK_CELL`; their fields have no types that mypy knows.
 Block: TypeAlias = Any
+Cell: TypeAlias = Any
 
 #: Rows of the results of a cell; the counts are those of a record.
 RESULTS = (
@@ -64,6 +76,7 @@ RESULTS = (
     "continuous_pulses",
     "largest_displacement",
     "smallest_displacement",
+    "clearance",
 )
 
 #: Relative size of the last step to a root, whose error is its square, and the most steps.
@@ -180,7 +193,8 @@ def root_of_speed(
         else:
             high = tau
         new = tau - value / rate
-        if not low <= new <= high:
+        # at an end that has been tried before, rounding would send it to and fro
+        if new != tau and not low < new < high:
             new = 0.5 * (low + high)
         step = abs(new - tau)
         tau = new
@@ -250,35 +264,12 @@ def add(block: Block, moved: float) -> None:
 
 
 @scalar
-def slide_on_lines(block: Block, pieces: np.ndarray, p: int, end: int) -> int:
-    """Slide along whole straight pieces; return the first in which V stops or turns, or `end`."""
-    side = math.copysign(1.0, block.velocity)
-    limit = block.yield_acceleration if side > 0.0 else block.upslope_yield_acceleration
-    scale = side * block.amplitude
-    speed = side * block.velocity
-    largest = speed
-    slowest = speed
-    moved = 0.0
-    while p < end:
-        piece = pieces[p]
-        rate = scale * piece.first - limit
-        last_rate = scale * piece.last - limit
-        length = piece.finish - piece.begin
-        last_speed = speed + 0.5 * (rate + last_rate) * length
-        turns = rate > 0.0 > last_rate or rate < 0.0 < last_rate
-        if turns or last_speed <= 0.0 or piece.degree > 1:
-            break
-        moved += (speed + (2.0 * rate + last_rate) * length / 6.0) * length
-        speed = last_speed
-        largest = max(largest, speed)
-        slowest = min(slowest, speed)
-        p += 1
-    add(block, side * moved)
-    block.velocity = side * speed
-    block.slowest = min(block.slowest, slowest)
-    if side > 0.0:
-        block.largest_velocity = max(block.largest_velocity, largest)
-    return p
+def reach(block: Block, velocity: float) -> None:
+    """Set V, and where it is 0 the extremes of W over time, which lie there."""
+    block.velocity = velocity
+    if velocity == 0.0:
+        block.largest_displacement = max(block.largest_displacement, block.displacement)
+        block.smallest_displacement = min(block.smallest_displacement, block.displacement)
 
 
 @scalar
@@ -312,13 +303,10 @@ def slide_along(
     gained, moved = gains(piece, curve, scale, excess, tau, end)
     add(block, side * (moved + speed * (end - tau)))
     speed = 0.0 if stops else max(speed + gained, 0.0)
-    block.velocity = side * speed
+    reach(block, side * speed)
     if side > 0.0:
         block.largest_velocity = max(block.largest_velocity, largest, speed)
     block.slowest = min(block.slowest, speed)
-    if speed == 0.0:
-        block.largest_displacement = max(block.largest_displacement, block.displacement)
-        block.smallest_displacement = min(block.smallest_displacement, block.displacement)
     return end
 
 
@@ -344,8 +332,8 @@ def onset_on(block: Block, piece: Piece, curve: Curve, tau: float) -> float:
 def move_along(block: Block, piece: Piece, curve: Curve, wants_peak: bool) -> None:
     """Take the block along a piece: it slides, stops, rests and slides again."""
     tau = piece.begin
-    # at most a stop, a slide the other way, and a stop of that
-    for _ in range(3):
+    block.parts = 0
+    for part in range(MOST_PARTS):
         if block.velocity == 0.0:
             tau = onset_on(block, piece, curve, tau)
             if tau >= piece.finish:
@@ -354,7 +342,13 @@ def move_along(block: Block, piece: Piece, curve: Curve, wants_peak: bool) -> No
             side = math.copysign(1.0, piece.top)
         else:
             side = math.copysign(1.0, block.velocity)
+        block.parts += 1
+        block.part_start[part] = tau
+        block.part_side[part] = side
+        block.part_speed[part] = side * block.velocity
+        block.part_displacement[part] = block.displacement
         tau = slide_along(block, piece, curve, tau, side, wants_peak)
+        block.part_end[part] = tau
         if tau >= piece.finish or math.isnan(tau):
             return
         if side * piece.top > 0.0 and piece.begin == 0.0:
@@ -365,59 +359,26 @@ def move_along(block: Block, piece: Piece, curve: Curve, wants_peak: bool) -> No
 
 
 @scalar
-def walk(block: Block, path: Path, first: int, end: int, wants_peak: bool) -> float:
-    """Go through some pieces; return how many half waves in which Üg exceeds Üy have passed.
-
-    A block at rest that slides downslope only goes on at the next of them.
-    """
+def walk(block: Block, path: Path, first: int, end: int, wants_peak: bool) -> None:
+    """Go through some pieces."""
     pieces = path.base.pieces
-    intervals = path.intervals
     amplitude = block.amplitude
     downslope = block.yield_acceleration
     upslope = block.upslope_yield_acceleration
-    one_way = upslope == math.inf
-    pulses = 0.0
-    k = 0
-    p = first
-    while p < end:
-        if block.velocity == 0.0:
-            if one_way:
-                while k < intervals.size:
-                    exceeds = amplitude * intervals[k].height > downslope
-                    if exceeds and intervals[k].end > p:
-                        break
-                    pulses += 1.0 if exceeds else 0.0
-                    k += 1
-                if k == intervals.size:
-                    return pulses
-                p = max(p, intervals[k].first)
-            while p < end and -upslope <= amplitude * pieces[p].top <= downslope:
-                p += 1
-            if p >= end:
-                break
-            if one_way and p >= intervals[k].end:
-                continue
-        else:
-            p = slide_on_lines(block, pieces, p, end)
-            if p == end:
-                break
+    for p in range(first, end):
         piece = pieces[p]
-        move_along(block, piece, path.base.curves[piece.curve], wants_peak)
-        p += 1
-    for later in range(k, intervals.size):
-        pulses += 1.0 if amplitude * intervals[later].height > downslope else 0.0
-    return pulses
+        if block.velocity != 0.0 or not -upslope <= amplitude * piece.top <= downslope:
+            move_along(block, piece, path.base.curves[piece.curve], wants_peak)
 
 
 @scalar
-def walk_cycles(block: Block, path: Path, wants_peak: bool) -> float:
-    """Go through all cycles of the path; return the number of pulses of a record.
+def walk_cycles(block: Block, path: Path, wants_peak: bool) -> None:
+    """Go through all cycles of the path.
 
     A cycle that begins with the same V as one of the same shape gains the same.  Where V keeps its
     sign throughout, the next cycles gain the same V as long as it does, and W is a series.
     """
     period = 2.0 * math.pi
-    pulses = 0.0
     shape = -1  # of the cycle that is remembered, and V and W at its beginning
     start = 0.0
     before = 0.0
@@ -452,7 +413,7 @@ def walk_cycles(block: Block, path: Path, wants_peak: bool) -> float:
             velocity = block.velocity
             displacement = block.displacement
             block.slowest = abs(velocity)
-            pulses += walk(block, path, path.cycles[c].first, path.cycles[c + 1].first, wants_peak)
+            walk(block, path, path.cycles[c].first, path.cycles[c + 1].first, wants_peak)
             left -= 1
             age += 1
             loss = abs(velocity) - abs(block.velocity)
@@ -466,27 +427,17 @@ def walk_cycles(block: Block, path: Path, wants_peak: bool) -> float:
                 age += int(alike)
     block.largest_displacement = max(block.largest_displacement, largest)
     block.smallest_displacement = min(block.smallest_displacement, smallest)
-    return pulses
 
 
 @scalar
-def solve_cell(
-    block: Block, cell: np.record, g: float, path: Path, wants_peak: bool, result: np.ndarray
-) -> None:
-    """Move a cell's block through the shaking and on to rest; `result` is (`RESULTS`,)."""
+def begin(block: Block, cell: Cell, g: float) -> bool:
+    """Set the block of a cell to rest; return False if it is statically unstable."""
     onset = given_or(
         cell.yield_acceleration, eq.coulomb_yield_acceleration(cell.mu_s, cell.tan_theta, g)
     )
-    result[2] = -1.0
-    result[3] = float(STATICALLY_UNSTABLE)
-    result[4] = result[5] = result[6] = -1.0
-    result[0] = result[1] = result[7] = result[8] = math.nan
-    if onset <= 0.0:
-        return
     block.amplitude = cell.amplitude
     block.yield_acceleration = onset
-    upslope = given_or(cell.upslope_yield_acceleration, math.inf)
-    block.upslope_yield_acceleration = upslope
+    block.upslope_yield_acceleration = given_or(cell.upslope_yield_acceleration, math.inf)
     block.velocity = 0.0
     block.displacement = 0.0
     block.lost = 0.0
@@ -494,13 +445,19 @@ def solve_cell(
     block.largest_displacement = 0.0
     block.smallest_displacement = 0.0
     block.slips = 0.0
-    pulses = walk_cycles(block, path, wants_peak)
+    return onset > 0.0
+
+
+@scalar
+def store(block: Block, pulses: float, result: np.ndarray) -> None:
+    """Let the block run out after the shaking, and write what has become of it (`RESULTS`,)."""
     side = math.copysign(1.0, block.velocity)
-    limit = onset if side > 0.0 else upslope
+    limit = block.yield_acceleration if side > 0.0 else block.upslope_yield_acceleration
     block.displacement += side * block.velocity * block.velocity / (2.0 * limit)
+    slides = block.amplitude > block.yield_acceleration
+    slides |= block.amplitude > block.upslope_yield_acceleration
     result[0] = block.displacement
     result[1] = block.largest_velocity
-    slides = cell.amplitude > onset or cell.amplitude > upslope
     result[2] = float(eq.STICK_SLIP if slides else eq.STUCK)
     result[3] = float(UNSOLVED if math.isnan(block.displacement) else 0)
     result[4] = block.slips
@@ -508,6 +465,16 @@ def solve_cell(
     result[6] = 0.0
     result[7] = max(block.largest_displacement, block.displacement)
     result[8] = min(block.smallest_displacement, block.displacement)
+    result[9] = result[7] - result[8]
+
+
+@scalar
+def store_no_value(result: np.ndarray) -> None:
+    """Write the results of a block that is statically unstable."""
+    result[:] = math.nan
+    result[2] = -1.0
+    result[3] = float(STATICALLY_UNSTABLE)
+    result[4:7] = -1.0
 
 
 @kernel
@@ -523,5 +490,10 @@ def solve_newmark(
 
     `blocks`, (1,) of `BLOCK`, is what the motion is kept in.
     """
+    block = blocks[0]
     for j in range(cells.size):
-        solve_cell(blocks[0], cells[j], g, path, wants_peak, results[:, j])
+        if begin(block, cells[j], g):
+            walk_cycles(block, path, wants_peak)
+            store(block, 0.0, results[:, j])
+        else:
+            store_no_value(results[:, j])

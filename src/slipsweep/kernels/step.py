@@ -1,9 +1,10 @@
 """The paper's block, stepped in time: V += (Üg − Ü) h.
 
-What the block does is its phase: it says what Ü is (`rate`).  The base's motion comes in monotone
-pieces, from one zero, peak or sample to the next (`walk`).  Along a piece the block takes equal
-steps (`step_along`) by one of three rules (`advance`).  A step in which a phase ends (`excess`) is
-taken up to there, and the block goes on in the next phase.
+The base's motion comes in monotone pieces, from one zero, peak or sample to the next (`walk`).
+What the block does is its phase: it says what Ü is (`rate`).  Along a piece the block takes equal
+steps (`step_along`) by one of three rules (`advance`).  A step in which the phase ends (`excess`)
+is cut there, and the block goes on in the next phase (`end_phase`).  Eq. 12 takes a single step
+(`attenuate`).
 
 Time is the phase ωt here, so that V = ωv and W = ω²u; under a record it is the time at scale 1.
 docs/numerics.md#step-solver
@@ -14,6 +15,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import inlined, registered, scalar, single
@@ -25,16 +27,29 @@ from slipsweep.kernels.block import (
     NEWMARK,
     NO_VALUE,
     Cell,
-    Motion,
+    Interface,
     Options,
 )
 from slipsweep.model import equations as eq
-from slipsweep.motion.paths import TERMS, Curve, Path, Piece
+from slipsweep.motion.paths import TERMS, Base, Path
 
 #: Rules by which steps are taken; their errors are of the orders 1, 2 and 4.
 RECTANGLE = 0
 TRAPEZOID = 1
 SIMPSON = 2
+
+#: Stages of the rules: each evaluates the rate at a node, a part of the step, from the second on
+#: reached with the rate of the stage before it; their weights in the gain of V, over h, and of W,
+#: over h².  Simpson's rule is that of Runge and Kutta where friction does not depend on the motion.
+RUNGE_KUTTA = 3
+STAGES = np.array([1, 1, 2, 3])  # after the first, which is known from the step before
+NODES = np.array([[0, 1, 0, 0], [0, 1, 0, 0], [0, 1 / 2, 1, 0], [0, 1 / 2, 1 / 2, 1]])
+VELOCITY_WEIGHTS = np.array(
+    [[1, 0, 0, 0], [1 / 2, 1 / 2, 0, 0], [1 / 6, 4 / 6, 1 / 6, 0], [1 / 6, 2 / 6, 2 / 6, 1 / 6]]
+)
+DISPLACEMENT_WEIGHTS = np.array(
+    [[1 / 2, 0, 0, 0], [1 / 3, 1 / 6, 0, 0], [1 / 6, 2 / 6, 0, 0], [1 / 6, 1 / 6, 1 / 6, 0]]
+)
 
 #: Phases of the motion, each with its block acceleration Ü.
 STUCK = 0  # Ü = Üg, V = 0
@@ -47,29 +62,16 @@ DOWN = 6  # Newmark's block, V > 0: Ü = Üy
 UP = 7  # Newmark's block, V < 0: Ü = −Üy,up
 
 
-class Slide(NamedTuple):
-    """What Ü depends on in a phase, besides Üg and V; `seconds` is the time of a unit of phase."""
-
-    phase: int
-    held: float  # b
-    yield_acceleration: float
-    upslope_yield_acceleration: float
-    mu_s: float
-    delta_mu: float
-    decay_rate: float
-    tan_theta: float
-    g: float
-    seconds: float
-
-
 class Law(NamedTuple):
-    """A friction law: μ(slide, Üg, v) with v in m/s, and whether it depends on v.
+    """A friction law μ(block, Üg, v, s).
 
-    Newmark's block keeps its yield acceleration, or (`is_strength`) has that of Coulomb with μ.
+    v is the relative velocity in m/s, s = ∫|v|dt the slip in m.  `knows_motion` says whether μ
+    depends on v or s.  Newmark's block keeps its yield acceleration, or (`is_strength`) has that of
+    Coulomb with μ.
     """
 
     friction: Callable[..., float]
-    knows_velocity: bool
+    knows_motion: bool
     is_strength: bool
 
 
@@ -92,7 +94,7 @@ BLOCK = np.dtype(
             ("yield_acceleration", "f8"),
             ("upslope_yield_acceleration", "f8"),
             ("g", "f8"),
-            ("seconds", "f8"),
+            ("seconds", "f8"),  # in a unit of phase
             ("mode", "i8"),  # `SlidingMode`; under a record that of the pulse
             ("rise", "i8"),
             ("recoupling", "i8"),
@@ -104,35 +106,45 @@ BLOCK = np.dtype(
             ("held", "f8"),  # b
             ("velocity", "f8"),  # V
             ("displacement", "f8"),  # W
+            ("slip", "f8"),  # ∫|V|
             ("largest_velocity", "f8"),
             ("least_velocity", "f8"),
             ("largest_displacement", "f8"),
             ("smallest_displacement", "f8"),
-            ("onset", "f8"),  # when the slide began, and the rest of the piece from there
+            ("zero", "f8"),  # time at τ = 0 of the piece
+            ("onset", "f8"),  # time at which the slide began, and the rest of the piece from there
             ("growth", "f8"),
             ("slips", "f8"),
             ("stick_slip_pulses", "f8"),
             ("continuous_pulses", "f8"),
             ("validity", "i8"),
+            ("logged", "i8"),  # steps noted in the log
         ],
     )
 )
 
+#: A step that was taken, for histories; `first`, `middle` and `last` are values of Ü.
+LOG = np.dtype(
+    (
+        np.record,
+        [
+            ("phase", "i8"),
+            ("time", "f8"),
+            ("step", "f8"),
+            ("velocity", "f8"),
+            ("gained", "f8"),
+            ("displacement", "f8"),
+            ("first_rate", "f8"),
+            ("last_rate", "f8"),
+            ("first", "f8"),
+            ("middle", "f8"),
+            ("last", "f8"),
+        ],
+    )
+)
 
 #: A record of `BLOCK`; its fields have no types that mypy knows.
 Block: TypeAlias = Any
-
-
-class History(NamedTuple):
-    """Samples of the motion, each (samples,); of the first `done[0]` Ü, V and W are filled in."""
-
-    phases: np.ndarray
-    ground_acceleration: np.ndarray
-    block_acceleration: np.ndarray
-    friction_coefficient: np.ndarray
-    velocity: np.ndarray
-    displacement: np.ndarray
-    done: np.ndarray
 
 
 class Steps(NamedTuple):
@@ -142,9 +154,21 @@ class Steps(NamedTuple):
     first: np.ndarray  # (pieces + 1,) where the points of a piece begin
 
 
-#: From its onset to the end of the piece a slide takes N/64 steps at least, later a step is at most
-#: 16/N of the time since the onset, so that slides shorter than a step are resolved.  No step is
-#: cut shorter than the last number.
+#: Rows of the results of a cell; the counts are those of a record.
+RESULTS = (
+    "permanent_displacement",
+    "peak_relative_velocity",
+    "sliding_mode",
+    "validity",
+    "number_of_slips",
+    "stick_slip_pulses",
+    "continuous_pulses",
+    "largest_displacement",
+    "smallest_displacement",
+    "clearance",
+)
+
+#: How long a step may be after the onset of a slide (`step_along`); none is cut shorter than the last.
 GROWTH_SHARE = 64.0
 TIME_SHARE = 16.0
 SHORTEST_STEP = 1e-14
@@ -158,165 +182,117 @@ POINTS_OF_RISE = 32
 
 
 @registered
-def exponential_friction(slide: Slide, ground: float, velocity: float) -> float:
-    """Eq. 6, the friction law of the paper, which does not depend on the velocity."""
-    return eq.friction_coefficient(ground, slide.mu_s, slide.delta_mu, slide.decay_rate, slide.g)
+def exponential_friction(block: Block, ground: float, velocity: float, slip: float) -> float:
+    """Eq. 6, the friction law of the paper, which does not depend on the motion."""
+    return eq.friction_coefficient(ground, block.mu_s, block.delta_mu, block.decay_rate, block.g)
 
 
 # ------------------------------------------------------------------ one step
 
 
 @inlined
-def slide_of(block: Block) -> Slide:
-    """What Ü of a block depends on in its phase."""
-    return Slide(
-        block.phase,
-        block.held,
-        block.yield_acceleration,
-        block.upslope_yield_acceleration,
-        block.mu_s,
-        block.delta_mu,
-        block.decay_rate,
-        block.tan_theta,
-        block.g,
-        block.seconds,
+def friction_at(law: Law, block: Block, ground: float, velocity: float, slip: float) -> float:
+    """μ by the law, at V and after ∫|V|."""
+    return law.friction(
+        block, ground, velocity * block.seconds, slip * block.seconds * block.seconds
     )
 
 
 @inlined
-def eq4_rate(law: Law, slide: Slide, ground: float, velocity: float) -> float:
-    """Üg − Ü with Ü by Eq. 4."""
-    friction = law.friction(slide, ground, velocity * slide.seconds)
-    return eq.relative_acceleration(ground, friction, slide.mu_s, slide.tan_theta, slide.g)
+def eq4_rate(law: Law, block: Block, ground: float, velocity: float, slip: float) -> float:
+    """Üg − Ü with Ü by Eq. 4; positive where a block at rest begins to slide."""
+    friction = friction_at(law, block, ground, velocity, slip)
+    return eq.relative_acceleration(ground, friction, block.mu_s, block.tan_theta, block.g)
 
 
 @inlined
-def newmark_acceleration(law: Law, slide: Slide, ground: float, velocity: float) -> float:
-    """Ü of Newmark's block: what it resists, by its yield acceleration or by Coulomb with μ."""
+def newmark_rate(law: Law, block: Block, ground: float, velocity: float, slip: float) -> float:
+    """Üg − Ü of Newmark's block, with Ü its yield acceleration or that of Coulomb with μ."""
+    up = block.phase == UP
     if law.is_strength:
-        friction = law.friction(slide, ground, velocity * slide.seconds)
-        if slide.phase == UP:
-            return -eq.coulomb_yield_acceleration(friction, -slide.tan_theta, slide.g)
-        return eq.coulomb_yield_acceleration(friction, slide.tan_theta, slide.g)
-    if slide.phase == UP:
-        return -slide.upslope_yield_acceleration
-    return slide.yield_acceleration
+        friction = friction_at(law, block, ground, velocity, slip)
+        tan_theta = -block.tan_theta if up else block.tan_theta
+        resistance = eq.coulomb_yield_acceleration(friction, tan_theta, block.g)
+    else:
+        resistance = block.upslope_yield_acceleration if up else block.yield_acceleration
+    return ground + resistance if up else ground - resistance
 
 
 @inlined
-def rate(law: Law, slide: Slide, ground: float, velocity: float) -> float:
-    """Rate of V, Üg − Ü, in a phase; Eq. 12 takes no steps (`attenuate`)."""
-    if slide.phase == HELD or slide.phase == HELD_ON:
-        return ground - slide.held
-    if slide.phase == DOWN or slide.phase == UP:
-        return ground - newmark_acceleration(law, slide, ground, velocity)
-    return eq4_rate(law, slide, ground, velocity)
+def rate(law: Law, block: Block, ground: float, velocity: float, slip: float) -> float:
+    """Rate of V, Üg − Ü, in the block's phase; Eq. 12 takes no steps (`attenuate`)."""
+    if block.phase == HELD or block.phase == HELD_ON:
+        return ground - block.held
+    if block.phase == DOWN or block.phase == UP:
+        return newmark_rate(law, block, ground, velocity, slip)
+    return eq4_rate(law, block, ground, velocity, slip)
 
 
-@scalar
-def eq4_rate_at_rest(law: Law, block: Block, ground: float) -> float:
-    """Üg − Ü with Ü by Eq. 4 and V = 0: positive where a block at rest begins to slide."""
-    return eq4_rate(law, slide_of(block), ground, 0.0)
+class Step(NamedTuple):
+    """A step: Üg at its start, its middle and its end, the rates of V there, and gains of V and W."""
 
-
-@scalar
-def eq4_of(law: Law, block: Block, ground: float) -> float:
-    """Ü by Eq. 4 at the velocity of the block."""
-    return ground - eq4_rate(law, slide_of(block), ground, block.velocity)
+    h: float
+    ground: tuple[float, float, float]
+    first_rate: float
+    middle_rate: float
+    last_rate: float
+    gained: float
+    moved: float
 
 
 @inlined
 def advance(
     law: Law,
-    slide: Slide,
-    rule: int,
+    block: Block,
     ground: tuple[float, float, float],
     h: float,
-    velocity: float,
     first_rate: float,
-) -> tuple[float, float, float, float]:
-    """Take a step h from V: return the gains of V and W, and the rates in its middle and at its end.
+) -> Step:
+    """Find what a step h gains: V += (Üg − Ü) h.
 
-    Üg is at the start, the middle and the end of the step; `first_rate` is the rate at the start.
+    Each stage of a rule goes from the start of the step to its node with the rate of the one before.
     """
-    middle = ground[1]
-    end = ground[2]
-    again = law.knows_velocity  # otherwise two rates at one Üg are the same
-    if rule == RECTANGLE:  # Euler's
-        gained = first_rate * h  # V += (Üg − Ü) h
-        moved = (velocity + 0.5 * gained) * h
-        last_rate = rate(law, slide, end, velocity + gained)
-        return gained, moved, 0.5 * (first_rate + last_rate), last_rate
-    if rule == TRAPEZOID:  # Heun's
-        end_rate = rate(law, slide, end, velocity + first_rate * h)
-        gained = 0.5 * (first_rate + end_rate) * h
-        moved = (velocity + (2.0 * first_rate + end_rate) * h / 6.0) * h
-        last_rate = rate(law, slide, end, velocity + gained) if again else end_rate
-        return gained, moved, 0.5 * (first_rate + last_rate), last_rate
-    # Runge's and Kutta's of order 4, which is Simpson's rule where friction does not depend on V
-    early_rate = rate(law, slide, middle, velocity + 0.5 * h * first_rate)
-    middle_rate = early_rate
-    if again:
-        middle_rate = rate(law, slide, middle, velocity + 0.5 * h * early_rate)
-    end_rate = rate(law, slide, end, velocity + h * middle_rate)
-    gained = (first_rate + 2.0 * (early_rate + middle_rate) + end_rate) * h / 6.0
-    moved = (velocity + (first_rate + early_rate + middle_rate) * h / 6.0) * h
-    last_rate = rate(law, slide, end, velocity + gained) if again else end_rate
-    return gained, moved, middle_rate, last_rate
+    rule = RUNGE_KUTTA if block.rule == SIMPSON and law.knows_motion else block.rule
+    velocity = block.velocity
+    speed = velocity
+    slope = first_rate
+    middle_rate = first_rate
+    gained = VELOCITY_WEIGHTS[rule, 0] * first_rate
+    moved = DISPLACEMENT_WEIGHTS[rule, 0] * first_rate
+    for stage in range(1, STAGES[rule] + 1):
+        part = NODES[rule, stage]
+        in_the_middle = part < 1.0
+        slip = block.slip + abs(part * h * speed)
+        speed = velocity + part * h * slope
+        slope = rate(law, block, ground[1] if in_the_middle else ground[2], speed, slip)
+        middle_rate = slope if in_the_middle else middle_rate
+        gained += VELOCITY_WEIGHTS[rule, stage] * slope
+        moved += DISPLACEMENT_WEIGHTS[rule, stage] * slope
+    gained *= h
+    moved = (velocity + moved * h) * h
+    if law.knows_motion:
+        slope = rate(law, block, ground[2], velocity + gained, block.slip + abs(moved))
+    if rule < SIMPSON:
+        middle_rate = 0.5 * (first_rate + slope)
+    return Step(h, ground, first_rate, middle_rate, slope, gained, moved)
 
 
-@inlined
-def excess(
-    law: Law,
-    slide: Slide,
-    monotone: bool,
-    rises: bool,
-    ground: tuple[float, float, float],
-    rates: tuple[float, float, float],
-    velocity: float,
-) -> float:
-    """Return what is positive at the end of a step in which the phase ends.
-
-    A phase ends where V changes its sign.  While Üg rises b is no longer held where Eq. 4 exceeds
-    it, and with the monotone rise it no longer follows Eq. 4 where that falls.  Üg and the rates
-    are those at the start, the middle and the end of the step.
-    """
-    if slide.phase == CONTINUOUS:
-        return -1.0
-    if slide.phase == UP:
-        return velocity
-    rounding = ROUNDING * abs(ground[2]) + LEAST_ROUNDING * slide.g  # of Eq. 4
-    if rises and slide.phase == HELD:
-        eq4 = ground[2] - eq4_rate(law, slide, ground[2], velocity)
-        return max(-velocity, eq4 - slide.held - rounding)
-    if rises and slide.phase == FOLLOWS and monotone:
-        first = ground[0] - rates[0]
-        middle = ground[1] - rates[1]
-        last = ground[2] - rates[2]
-        # how a parabola through the three falls at the end
-        return max(-velocity, 4.0 * middle - 3.0 * last - first - rounding)
-    return -velocity
-
-
-@inlined
-def turning_point(
-    velocity: float, h: float, first: float, middle: float, last: float
-) -> tuple[float, float]:
-    """Return when the rate is 0 in a step, by the parabola through three rates, and V there."""
-    bend = 2.0 * (first + last) - 4.0 * middle
-    slope = last - first - bend
-    part = 2.0 / (math.sqrt((slope / first) ** 2 - 4.0 * (bend / first)) - slope / first)
-    return part * h, velocity + h * part * (first + part * (0.5 * slope + part * bend / 3.0))
+@scalar
+def eq4_of(law: Law, block: Block, ground: float) -> float:
+    """Ü by Eq. 4 at the velocity of the block."""
+    return ground - eq4_rate(law, block, ground, block.velocity, block.slip)
 
 
 # ------------------------------------------------------------------ Üg on a piece
 
 
-@inlined
-def ground_at(block: Block, piece: Piece, curve: Curve, tau: float) -> float:
-    """Üg at τ on a piece, with the sign of the piece also where it is 0."""
+@scalar
+def ground_at(block: Block, base: Base, p: int, tau: float) -> float:
+    """Üg at τ on piece p, with the sign of the piece also where it is 0."""
+    piece = base.pieces[p]
     total = piece.slope * tau
     if piece.degree > 1:
+        curve = base.curves[piece.curve]
         total = 0.0
         for k in range(piece.degree - 1, -1, -1):
             total = (total + curve.coefficients[k]) * tau
@@ -325,42 +301,168 @@ def ground_at(block: Block, piece: Piece, curve: Curve, tau: float) -> float:
 
 @scalar
 def ground_in_step(
-    block: Block, piece: Piece, curve: Curve, tau: float, h: float
+    block: Block, base: Base, p: int, tau: float, h: float
 ) -> tuple[float, float, float]:
     """Üg at the start, the middle and the end of a step; in the middle a mean, if that will do."""
-    start = ground_at(block, piece, curve, tau)
-    end = ground_at(block, piece, curve, tau + h)
+    start = ground_at(block, base, p, tau)
+    end = ground_at(block, base, p, tau + h)
     if block.rule == SIMPSON:
-        return start, ground_at(block, piece, curve, tau + 0.5 * h), end
+        return start, ground_at(block, base, p, tau + 0.5 * h), end
     return start, 0.5 * (start + end), end
 
 
 @scalar
-def place_of(block: Block, piece: Piece, curve: Curve, level: float) -> float:
+def place_of(block: Block, base: Base, p: int, level: float) -> float:
     """Return τ at which |Üg| reaches a level on a piece on which it grows (the end, if it does not)."""
+    piece = base.pieces[p]
     if block.amplitude * abs(piece.first) >= level:
         return piece.begin
     low = piece.begin
     high = piece.finish
     while low < 0.5 * (low + high) < high:
         middle = 0.5 * (low + high)
-        if abs(ground_at(block, piece, curve, middle)) >= level:
+        if abs(ground_at(block, base, p, middle)) >= level:
             high = middle
         else:
             low = middle
     return high
 
 
+# ------------------------------------------------------------------ the end of a phase
+
+
+@inlined
+def opposite(first: float, last: float) -> bool:
+    """Return whether two values have opposite signs."""
+    return first < 0.0 < last or last < 0.0 < first
+
+
+@inlined
+def velocity_in_step(block: Block, step: Step, part: float) -> float:
+    """V after a part of a step: the cubic through the values and rates at both ends."""
+    left = 1.0 - part
+    gained = part * part * (3.0 - 2.0 * part) * step.gained
+    bend = part * left * (left * step.first_rate - part * step.last_rate) * step.h
+    return block.velocity + gained + bend
+
+
 @scalar
-def advance_from(
-    law: Law, block: Block, piece: Piece, curve: Curve, tau: float, h: float, first_rate: float
-) -> tuple[tuple[float, float, float], float, float, float, float]:
-    """Take a step from τ: return Üg in it, and what `advance` returns."""
-    ground = ground_in_step(block, piece, curve, tau, h)
-    gained, moved, middle_rate, last_rate = advance(
-        law, slide_of(block), block.rule, ground, h, block.velocity, first_rate
-    )
-    return ground, gained, moved, middle_rate, last_rate
+def eq4_in_step(
+    law: Law, block: Block, base: Base, p: int, tau: float, step: Step, part: float
+) -> float:
+    """Ü by Eq. 4 after a part of a step from τ."""
+    ground = ground_at(block, base, p, tau + part * step.h)
+    slip = block.slip + part * abs(step.moved)
+    return ground - eq4_rate(law, block, ground, velocity_in_step(block, step, part), slip)
+
+
+@inlined
+def exceeds(law: Law, block: Block, step: Step) -> bool:
+    """Return whether Eq. 4 is larger than b at the end of a step, by more than rounding."""
+    ground = step.ground[2]
+    velocity = block.velocity + step.gained
+    eq4 = ground - eq4_rate(law, block, ground, velocity, block.slip + abs(step.moved))
+    return eq4 - block.held > ROUNDING * abs(ground) + LEAST_ROUNDING * block.g
+
+
+@inlined
+def falls(block: Block, step: Step) -> bool:
+    """Return whether Ü, by the parabola through three values, falls at the end of a step."""
+    first = step.ground[0] - step.first_rate
+    middle = step.ground[1] - step.middle_rate
+    last = step.ground[2] - step.last_rate
+    rounding = ROUNDING * abs(step.ground[2]) + LEAST_ROUNDING * block.g
+    return 4.0 * middle - 3.0 * last - first > rounding
+
+
+@inlined
+def may_end(law: Law, block: Block, rises: bool, step: Step) -> bool:
+    """Return whether the phase may end in a step, or V be largest or least in it.
+
+    A phase ends where V changes its sign.  While Üg rises b is no longer held where Eq. 4 exceeds
+    it, and with the monotone rise it no longer follows Eq. 4 where that falls.
+    """
+    if opposite(step.first_rate, step.last_rate):
+        return True
+    if block.phase == CONTINUOUS:
+        return False
+    velocity = block.velocity + step.gained
+    if velocity > 0.0 if block.phase == UP else velocity < 0.0:
+        return True
+    if rises and block.phase == HELD:
+        return exceeds(law, block, step)
+    return rises and block.phase == FOLLOWS and block.rise == MONOTONE and falls(block, step)
+
+
+@scalar
+def part_to_turn(step: Step) -> float:
+    """Return the part of a step after which the rate, a parabola through three values, is 0."""
+    bend = 2.0 * (step.first_rate + step.last_rate) - 4.0 * step.middle_rate
+    slope = step.last_rate - step.first_rate - bend
+    low = 0.0
+    high = 1.0
+    while low < 0.5 * (low + high) < high:
+        part = 0.5 * (low + high)
+        if (step.first_rate + part * (slope + part * bend)) * step.last_rate > 0.0:
+            high = part
+        else:
+            low = part
+    return high
+
+
+@scalar
+def part_to_stop(block: Block, step: Step) -> float:
+    """Return the part of a step after which V changes its sign; infinity, if it does not."""
+    side = -1.0 if block.phase == UP else 1.0
+    low = 0.0
+    high = 1.0
+    if side * (block.velocity + step.gained) >= 0.0:
+        if not side * step.first_rate < 0.0 < side * step.last_rate:
+            return math.inf
+        high = part_to_turn(step)  # where it is least, and may have been 0
+        if side * velocity_in_step(block, step, high) >= 0.0:
+            return math.inf
+    while low < 0.5 * (low + high) < high:
+        part = 0.5 * (low + high)
+        if side * velocity_in_step(block, step, part) < 0.0:
+            high = part
+        else:
+            low = part
+    return high
+
+
+@scalar
+def part_to_exceed(law: Law, block: Block, base: Base, p: int, tau: float, step: Step) -> float:
+    """Return the part of a step after which Eq. 4 exceeds b; infinity, if it does not."""
+    if not exceeds(law, block, step):
+        return math.inf
+    low = 0.0
+    high = 1.0
+    while low < 0.5 * (low + high) < high:
+        part = 0.5 * (low + high)
+        if eq4_in_step(law, block, base, p, tau, step, part) > block.held:
+            high = part
+        else:
+            low = part
+    return high
+
+
+@scalar
+def part_to_fall(law: Law, block: Block, base: Base, p: int, tau: float, step: Step) -> float:
+    """Return the part of a step after which Eq. 4 falls; infinity, if it does not."""
+    if not falls(block, step):
+        return math.inf
+    low = 0.0
+    high = 1.0
+    while high - low > 1e-8:  # it hardly changes there
+        third = (high - low) / 3.0
+        early = eq4_in_step(law, block, base, p, tau, step, low + third)
+        late = eq4_in_step(law, block, base, p, tau, step, high - third)
+        if early < late:
+            low += third
+        else:
+            high -= third
+    return low
 
 
 # ------------------------------------------------------------------ from phase to phase
@@ -377,24 +479,24 @@ def rest(block: Block) -> None:
 
 
 @scalar
-def begin_slide(block: Block, phase: int, time: float, growth: float) -> None:
-    """Begin to slide, from rest or with a velocity kept."""
+def begin_slide(block: Block, base: Base, p: int, tau: float, phase: int) -> None:
+    """Begin to slide at τ, from rest or with a velocity kept."""
     block.phase = phase
-    block.onset = time
-    block.growth = growth
+    block.onset = block.zero + tau
+    block.growth = base.pieces[p].finish - tau if phase != CONTINUOUS else math.inf
     if block.velocity == 0.0:
         block.slips += 1.0
 
 
 @scalar
 def begin_stick_slip(
-    law: Law, block: Block, rises: bool, ground: float, time: float, growth: float
+    law: Law, block: Block, base: Base, p: int, tau: float, rises: bool, ground: float
 ) -> None:
     """t1: begin to slide with b = max(Üy, Eq. 4), with the literal rise b by Eq. 4."""
     eq4 = eq4_of(law, block, ground)
     follows = block.rise == LITERAL or eq4 >= block.yield_acceleration
     block.held = eq4 if follows else block.yield_acceleration
-    begin_slide(block, FOLLOWS if follows and rises else HELD, time, growth)
+    begin_slide(block, base, p, tau, FOLLOWS if follows and rises else HELD)
 
 
 @scalar
@@ -408,121 +510,99 @@ def end_positive_half_wave(block: Block) -> None:
 
 
 @scalar
-def end_phase(block: Block, eq4: float) -> None:
-    """Go on after a step up to the end of a phase, where `eq4` is Ü if it is by Eq. 4."""
-    if block.phase == UP or block.velocity <= 0.0:
-        rest(block)
-    elif block.phase == HELD:
-        block.phase = FOLLOWS
-    else:
-        block.held = eq4
-        block.phase = HELD
-
-
-@scalar
-def wait_for_newmark(block: Block, piece: Piece, curve: Curve, now: float, tau: float) -> float:
+def wait_for_yield(block: Block, base: Base, p: int, tau: float) -> float:
     """Return τ at which Newmark's block at rest begins to slide: where Üg exceeds what it resists."""
+    piece = base.pieces[p]
     down = piece.top > 0.0
     limit = block.yield_acceleration if down else block.upslope_yield_acceleration
     if block.amplitude * abs(piece.top) <= limit:
         return piece.finish
     if abs(piece.last) > abs(piece.first):
-        tau = max(tau, place_of(block, piece, curve, limit))
-    elif abs(ground_at(block, piece, curve, tau)) <= limit:
+        tau = max(tau, place_of(block, base, p, limit))
+    elif abs(ground_at(block, base, p, tau)) <= limit:
         return piece.finish
-    begin_slide(block, DOWN if down else UP, now + tau, piece.finish - tau)
+    begin_slide(block, base, p, tau, DOWN if down else UP)
     return tau
 
 
 @scalar
-def wait(
-    law: Law, block: Block, piece: Piece, curve: Curve, now: float, tau: float, end: float
-) -> float:
+def wait_for_eq4(law: Law, block: Block, base: Base, p: int, tau: float, end: float) -> float:
     """Return τ at which the paper's block begins to slide while Üg rises beyond Üy: t1.
 
-    That is where Eq. 4 is below Üg, and `end`, if that is not so at the end, either.
+    That is where Eq. 4 is below Üg; `end`, if that is not so at the end, either.
     """
-    ground = ground_at(block, piece, curve, tau)
-    if eq4_rate_at_rest(law, block, ground) > 0.0:
-        begin_stick_slip(law, block, True, ground, now + tau, piece.finish - tau)
+    if block.amplitude * base.pieces[p].last < block.yield_acceleration:
+        return base.pieces[p].finish
+    if ground_at(block, base, p, tau) < block.yield_acceleration:
+        tau = place_of(block, base, p, block.yield_acceleration)
+    ground = ground_at(block, base, p, tau)
+    if eq4_of(law, block, ground) < ground:
+        begin_stick_slip(law, block, base, p, tau, True, ground)
         return tau
-    if eq4_rate_at_rest(law, block, ground_at(block, piece, curve, end)) <= 0.0:
+    end = max(tau, end)
+    ground = ground_at(block, base, p, end)
+    if eq4_of(law, block, ground) >= ground:
         return end
     low = tau
     high = end
     while low < 0.5 * (low + high) < high:
         middle = 0.5 * (low + high)
-        if eq4_rate_at_rest(law, block, ground_at(block, piece, curve, middle)) > 0.0:
+        ground = ground_at(block, base, p, middle)
+        if eq4_of(law, block, ground) < ground:
             high = middle
         else:
             low = middle
-    # Eq. 4 is Üg there, but for rounding
-    block.held = ground_at(block, piece, curve, high)
-    phase = FOLLOWS if block.rise == LITERAL else HELD
-    begin_slide(block, phase, now + high, piece.finish - high)
+    block.held = ground_at(block, base, p, high)  # Eq. 4 is Üg there, but for rounding
+    begin_slide(block, base, p, high, FOLLOWS if block.rise == LITERAL else HELD)
     return high
 
 
-# ------------------------------------------------------------------ samples of a history
+@scalar
+def wait(law: Law, block: Block, base: Base, p: int, rises: bool, tau: float, end: float) -> float:
+    """Return τ at which a block at rest begins to slide, or up to which it does not."""
+    if block.rise == NEWMARK:
+        return wait_for_yield(block, base, p, tau)
+    if rises and block.in_pulse:
+        return wait_for_eq4(law, block, base, p, tau, end)
+    return base.pieces[p].finish
 
 
 @scalar
-def sample_rest(block: Block, until: float, history: History) -> None:
-    """Fill in the samples before a time, up to which the block rests."""
-    at = history.done[0]
-    while at < history.phases.size and history.phases[at] < until:
-        history.velocity[at] = block.velocity  # of continuous sliding after the shaking
-        history.displacement[at] = block.displacement
-        at += 1
-    history.done[0] = at
+def note(block: Block, log: np.ndarray, time: float, step: Step) -> None:
+    """Note a step in the log; beyond its end steps are only counted."""
+    if block.logged < log.size:
+        row = log[block.logged]
+        row.phase = block.phase
+        row.time = time
+        row.step = step.h
+        row.velocity = block.velocity
+        row.gained = step.gained
+        row.displacement = block.displacement
+        row.first_rate = step.first_rate
+        row.last_rate = step.last_rate
+        row.first = step.ground[0] - step.first_rate
+        row.middle = step.ground[1] - step.middle_rate
+        row.last = step.ground[2] - step.last_rate
+    block.logged += 1
 
 
 @scalar
-def sample_step(
-    law: Law,
-    block: Block,
-    piece: Piece,
-    curve: Curve,
-    now: float,
-    tau: float,
-    h: float,
-    first_rate: float,
-    history: History,
-) -> None:
-    """Fill in the samples within a step from τ."""
-    if block.velocity == 0.0:
-        sample_rest(block, now + tau, history)
-    at = history.done[0]
-    while at < history.phases.size and history.phases[at] < now + tau + h:
-        part = max(history.phases[at] - (now + tau), 0.0)  # between two steps is rounding
-        ground, gained, moved, _, last_rate = advance_from(
-            law, block, piece, curve, tau, part, first_rate
-        )
-        history.block_acceleration[at] = ground[2] - last_rate
-        history.velocity[at] = block.velocity + gained
-        history.displacement[at] = block.displacement + moved
-        at += 1
-    history.done[0] = at
-
-
-@scalar
-def attenuate(block: Block, time: float, duration: float, history: History) -> None:
+def attenuate(block: Block, log: np.ndarray, time: float, duration: float) -> None:
     """Eq. 12 for some time, or up to the stop: one step V −= b h, which is exact for any h."""
     side = math.copysign(1.0, block.velocity)
     speed = abs(block.velocity)
-    until = time + min(speed / block.held, duration)
-    at = history.done[0]
-    while at < history.phases.size and history.phases[at] < until:
-        h = max(history.phases[at] - time, 0.0)
-        moved = side * eq.attenuated_displacement(speed, block.held, h)
-        history.block_acceleration[at] += side * block.held
-        history.velocity[at] = side * eq.attenuated_velocity(speed, block.held, h)
-        history.displacement[at] = block.displacement + moved
-        at += 1
-    history.done[0] = at
-    block.displacement += side * eq.attenuated_displacement(speed, block.held, duration)
-    block.velocity = side * eq.attenuated_velocity(speed, block.held, duration)
-    if block.velocity == 0.0:
+    moved = eq.attenuated_displacement(speed, block.held, duration)
+    left = eq.attenuated_velocity(speed, block.held, duration)
+    if log.size > 0:
+        braking = -side * block.held
+        h = min(speed / block.held, duration)
+        nowhere = (0.0, 0.0, 0.0)
+        gained = side * (left - speed)
+        note(block, log, time, Step(h, nowhere, braking, braking, braking, gained, side * moved))
+    block.displacement += side * moved
+    block.slip += moved
+    block.velocity = side * left
+    if left == 0.0:
         rest(block)
 
 
@@ -530,66 +610,26 @@ def attenuate(block: Block, time: float, duration: float, history: History) -> N
 
 
 @scalar
-def excess_after(
-    law: Law,
-    block: Block,
-    piece: Piece,
-    curve: Curve,
-    rises: bool,
-    tau: float,
-    h: float,
-    first_rate: float,
-) -> float:
-    """Return `excess` after a step from τ."""
-    ground, gained, _, middle_rate, last_rate = advance_from(
-        law, block, piece, curve, tau, h, first_rate
-    )
-    rates = (first_rate, middle_rate, last_rate)
-    return excess(
-        law, slide_of(block), block.rise == MONOTONE, rises, ground, rates, block.velocity + gained
-    )
+def rate_at(law: Law, block: Block, ground: float) -> float:
+    """Return the rate at the beginning of a phase; a slide that begins is not stopped by rounding."""
+    first_rate = rate(law, block, ground, block.velocity, block.slip)
+    if block.velocity == 0.0 and block.phase == UP:
+        return min(first_rate, 0.0)
+    if block.velocity == 0.0 and block.phase != CONTINUOUS:
+        return max(first_rate, 0.0)
+    return first_rate
 
 
-@scalar
-def step_to_end_of_phase(
-    law: Law,
-    block: Block,
-    piece: Piece,
-    curve: Curve,
-    rises: bool,
-    tau: float,
-    h: float,
-    first_rate: float,
-) -> float:
-    """Return the step, at most h, after which the phase ends.
-
-    By false position; the value at an end that stays twice is halved (the Illinois rule).
-    """
-    nearest = 1e-14 * h
-    low = 0.0
-    high = h
-    below = min(excess_after(law, block, piece, curve, rises, tau, low, first_rate), -1e-300)
-    above = excess_after(law, block, piece, curve, rises, tau, high, first_rate)
-    side = 0
-    tries = 0
-    while high - low > 2.0 * nearest:
-        tries += 1
-        new = 0.5 * (low + high)
-        if tries < 20:
-            new = high - above * ((high - low) / (above - below))
-            new = min(max(new, low + nearest), high - nearest)
-        value = excess_after(law, block, piece, curve, rises, tau, new, first_rate)
-        if value > 0.0:
-            high = new
-            above = value
-            below *= 0.5 if side == 1 else 1.0
-            side = 1
-        else:
-            low = new
-            below = value
-            above *= 0.5 if side == -1 else 1.0
-            side = -1
-    return high
+@inlined
+def take(block: Block, step: Step) -> None:
+    """Take a step."""
+    block.velocity += step.gained
+    block.displacement += step.moved
+    block.slip += abs(step.moved)
+    block.largest_velocity = max(block.largest_velocity, block.velocity)
+    block.least_velocity = min(block.least_velocity, block.velocity)
+    if block.phase == FOLLOWS:
+        block.held = step.ground[2] - step.last_rate  # b = Ü
 
 
 @scalar
@@ -602,156 +642,117 @@ def take_whole_steps(
     steps: int,
     first_rate: float,
 ) -> tuple[int, float]:
-    """Take whole steps up to one in which a phase ends or V turns; return how many, and the rate."""
-    slide = slide_of(block)
-    monotone = block.rise == MONOTONE
-    rule = block.rule
-    amplitude = block.amplitude
-    velocity = block.velocity
-    displacement = block.displacement
-    largest = block.largest_velocity
-    least = block.least_velocity
-    each = 2 if rule == SIMPSON else 1
-    taken = 0
-    while taken < steps:
-        start = amplitude * points[each * taken]
-        end = amplitude * points[each * (taken + 1)]
-        middle = amplitude * points[2 * taken + 1] if each == 2 else 0.5 * (start + end)
-        ground = (start, middle, end)
-        gained, moved, middle_rate, last_rate = advance(
-            law, slide, rule, ground, h, velocity, first_rate
-        )
-        rates = (first_rate, middle_rate, last_rate)
-        turns = first_rate < 0.0 < last_rate or last_rate < 0.0 < first_rate
-        if turns or excess(law, slide, monotone, rises, ground, rates, velocity + gained) > 0.0:
-            break
-        velocity += gained
-        displacement += moved
-        largest = max(largest, velocity)
-        least = min(least, velocity)
-        first_rate = last_rate
-        taken += 1
-    if taken > 0 and block.phase == FOLLOWS:
-        block.held = amplitude * points[each * taken] - first_rate
-    block.velocity = velocity
-    block.displacement = displacement
-    block.largest_velocity = largest
-    block.least_velocity = least
-    return taken, first_rate
+    """Take whole steps up to one in which the phase may end; return how many, and the rate there.
+
+    `points` is Üg over A at their ends.
+    """
+    each = 2 if block.rule == SIMPSON else 1
+    start = block.amplitude * points[0]
+    for taken in range(steps):
+        end = block.amplitude * points[each * (taken + 1)]
+        middle = block.amplitude * points[2 * taken + 1] if each == 2 else 0.5 * (start + end)
+        step = advance(law, block, (start, middle, end), h, first_rate)
+        if may_end(law, block, rises, step):
+            return taken, first_rate
+        take(block, step)
+        first_rate = step.last_rate
+        start = end
+    return steps, first_rate
+
+
+@scalar
+def try_step(
+    law: Law, block: Block, base: Base, p: int, tau: float, h: float, first_rate: float
+) -> Step:
+    """Return a step h from τ."""
+    return advance(law, block, ground_in_step(block, base, p, tau, h), h, first_rate)
 
 
 @scalar
 def take_step(
     law: Law,
     block: Block,
-    piece: Piece,
-    curve: Curve,
+    base: Base,
+    p: int,
     rises: bool,
-    now: float,
     tau: float,
     h: float,
     first_rate: float,
-    history: History,
+    log: np.ndarray,
 ) -> tuple[float, float]:
-    """Take a step h from τ, or a part of it up to the end of the phase; return the step and the rate.
+    """Take a step h from τ, or its part up to the end of the phase; return the step and the rate.
 
-    The rate is NaN where another phase follows.
+    The rate at the end of the step is NaN where another phase follows.
     """
-    ground, gained, moved, middle_rate, last_rate = advance_from(
-        law, block, piece, curve, tau, h, first_rate
-    )
-    rates = (first_rate, middle_rate, last_rate)
-    ends = (
-        excess(
-            law,
-            slide_of(block),
-            block.rise == MONOTONE,
-            rises,
-            ground,
-            rates,
-            block.velocity + gained,
-        )
-        > 0.0
-    )
-    turning = block.velocity
-    if first_rate < 0.0 < last_rate or last_rate < 0.0 < first_rate:
-        # V is largest or least in the step, and may have been 0
-        until, turning = turning_point(block.velocity, h, first_rate, middle_rate, last_rate)
-        stops = turning > 0.0 if block.phase == UP else turning < 0.0
-        if stops and not ends and block.phase != CONTINUOUS:
-            ends = True
-            h = until
-    if ends:
-        stays = gained >= 0.0 if block.phase == UP else gained <= 0.0
+    step = try_step(law, block, base, p, tau, h, first_rate)
+    stop = math.inf if block.phase == CONTINUOUS else part_to_stop(block, step)
+    change = math.inf  # from held to following Eq. 4, or back
+    if rises and block.phase == HELD:
+        change = part_to_exceed(law, block, base, p, tau, step)
+    elif rises and block.phase == FOLLOWS and block.rise == MONOTONE:
+        change = part_to_fall(law, block, base, p, tau, step)
+    part = min(stop, change)
+    if part <= 1.0:
+        stays = step.gained >= 0.0 if block.phase == UP else step.gained <= 0.0
         if block.velocity == 0.0 and stays:
             rest(block)  # rounding has made it slide
             return h, math.nan
-        h = step_to_end_of_phase(law, block, piece, curve, rises, tau, h, first_rate)
-        ground, gained, moved, _, last_rate = advance_from(
-            law, block, piece, curve, tau, h, first_rate
-        )
-        turning = block.velocity
-    if history.phases.size > 0:
-        sample_step(law, block, piece, curve, now, tau, h, first_rate, history)
-    block.velocity += gained
-    block.displacement += moved
-    block.largest_velocity = max(block.largest_velocity, block.velocity, turning)
-    block.least_velocity = min(block.least_velocity, block.velocity, turning)
-    if block.phase == FOLLOWS:
-        block.held = ground[2] - last_rate
-    if ends:
-        end_phase(block, ground[2] - last_rate)
-        return h, math.nan
-    return h, last_rate
+        step = try_step(law, block, base, p, tau, h * part, first_rate)
+    if log.size > 0:
+        note(block, log, block.zero + tau, step)
+    if opposite(step.first_rate, step.last_rate):
+        extreme = velocity_in_step(block, step, part_to_turn(step))
+        block.largest_velocity = max(block.largest_velocity, extreme)
+        block.least_velocity = min(block.least_velocity, extreme)
+    take(block, step)
+    if part > 1.0:
+        return h, step.last_rate
+    if stop <= change:
+        rest(block)
+    else:
+        block.phase = FOLLOWS if block.phase == HELD else HELD
+    return step.h, math.nan
 
 
 @scalar
 def step_along(
     law: Law,
     block: Block,
-    piece: Piece,
-    curve: Curve,
+    base: Base,
+    p: int,
     rises: bool,
-    now: float,
     tau: float,
-    finish: float,
+    until: float,
     points: np.ndarray,
-    history: History,
+    log: np.ndarray,
 ) -> None:
-    """Go from τ to `finish` on a piece, step by step; `now` is the time of τ = 0."""
+    """Go from τ to `until` on piece p, step by step; `points` is Üg over A at the ends of its steps.
+
+    From its onset to the end of the piece a slide takes N/64 steps at least, later a step is at
+    most 16/N of the time since the onset, so that slides shorter than a step are resolved.
+    """
+    piece = base.pieces[p]
     each = 2 if block.rule == SIMPSON else 1
     count = (points.size - 1) // each
     whole = (piece.finish - piece.begin) / count
-    # steps on the piece that are whole before `finish`
-    last = count if finish == piece.finish else int((finish - piece.begin) / whole)
-    first_rate = math.nan  # where it is not known from the step before
+    # steps on the piece that are whole before `until`
+    last = count if until == piece.finish else int((until - piece.begin) / whole)
     j = min(max(int((tau - piece.begin) / whole), 0), count - 1)
-    while tau < finish:
+    first_rate = math.nan  # where it is not known from the step before
+    while tau < until:
         while j + 1 < count and tau >= piece.begin + (j + 1) * whole:
             j += 1
-        begin = piece.begin + j * whole
-        end = min(piece.begin + (j + 1) * whole, finish) if j + 1 < count else finish
+        end = min(piece.begin + (j + 1) * whole, until) if j + 1 < count else until
         if block.phase == STUCK:
+            tau = wait(law, block, base, p, rises, tau, end)
             first_rate = math.nan
-            if block.rise == NEWMARK:
-                tau = wait_for_newmark(block, piece, curve, now, tau)
-            elif rises and ground_at(block, piece, curve, finish) >= block.yield_acceleration:
-                if ground_at(block, piece, curve, tau) < block.yield_acceleration:
-                    tau = place_of(block, piece, curve, block.yield_acceleration)
-                tau = wait(law, block, piece, curve, now, tau, max(tau, end))
-            else:
-                return
             continue
-        since = now + tau - block.onset
-        longest = max(GROWTH_SHARE * block.growth, TIME_SHARE * since) / block.steps
         if math.isnan(first_rate):
-            first_rate = rate(
-                law, slide_of(block), ground_at(block, piece, curve, tau), block.velocity
-            )
-            if block.velocity == 0.0 and block.phase != CONTINUOUS:
-                # a slide that begins is not stopped by rounding
-                first_rate = min(first_rate, 0.0) if block.phase == UP else max(first_rate, 0.0)
-        if tau == begin and longest >= whole and j < last and history.phases.size == 0:
+            first_rate = rate_at(law, block, ground_at(block, base, p, tau))
+        since = block.zero + tau - block.onset
+        longest = max(GROWTH_SHARE * block.growth, TIME_SHARE * since) / block.steps
+        is_whole = j < last and tau == piece.begin + j * whole and longest >= whole
+        if is_whole and log.size == 0:
             taken, first_rate = take_whole_steps(
                 law, block, rises, whole, points[each * j :], last - j, first_rate
             )
@@ -760,17 +761,15 @@ def step_along(
                 tau = piece.finish if j == count else piece.begin + j * whole
                 continue
         h = min(max(longest, SHORTEST_STEP), end - tau)
-        h_taken, first_rate = take_step(
-            law, block, piece, curve, rises, now, tau, h, first_rate, history
-        )
-        tau = end if h_taken >= end - tau else tau + h_taken
+        passed, first_rate = take_step(law, block, base, p, rises, tau, h, first_rate, log)
+        tau = end if passed >= end - tau else tau + passed
 
 
 # ------------------------------------------------------------------ pulses
 
 
 @scalar
-def set_friction(block: Block, cell: np.record, options: Options, peak: float) -> flags.Interface:
+def set_friction(block: Block, cell: np.record, options: Options, peak: float) -> Interface:
     """Set the block's friction and mode for shaking of that peak, by Eqs. 6-11."""
     parameters = Cell(
         cell.tan_theta,
@@ -796,18 +795,18 @@ def yield_governs(law: Law, block: Block, low: float, high: float) -> bool:
     """Return whether Eq. 4 stays at or below Üy while Üg rises from low to high."""
     for j in range(POINTS_OF_RISE, -1, -1):
         ground = low + (high - low) * (j / POINTS_OF_RISE)
-        if ground - eq4_rate_at_rest(law, block, ground) > block.yield_acceleration:
+        if eq4_of(law, block, ground) > block.yield_acceleration:
             return False
     return True
 
 
 @scalar
-def yield_governs_wave(law: Law, block: Block, path: Path) -> bool:
+def yield_governs_wave(law: Law, block: Block, base: Base) -> bool:
     """Return whether Eq. 4 stays at or below Üy on all rises, and wherever Üg jumps to."""
     if block.mode != eq.STICK_SLIP or block.rise != MONOTONE:
         return False
-    for p in range(path.base.pieces.size):
-        piece = path.base.pieces[p]
+    for p in range(base.pieces.size):
+        piece = base.pieces[p]
         if piece.top > 0.0 and (piece.last >= piece.first or piece.jumps):
             low = block.amplitude * piece.first
             high = max(low, block.amplitude * piece.last) if piece.last >= piece.first else low
@@ -833,7 +832,7 @@ def set_friction_of_pulse(
     block.mode = eq.STICK_SLIP
     if peak > interface.limiting_acceleration:
         block.mode = eq.CONTINUOUS
-        block.held = peak - eq4_rate_at_rest(law, block, peak)  # for Eq. 12 after it
+        block.held = eq4_of(law, block, peak)  # for Eq. 12 after it
         block.stick_slip_pulses -= 1.0
         block.continuous_pulses += 1.0
     elif block.rise == MONOTONE and yield_governs(law, block, block.yield_acceleration, peak):
@@ -843,30 +842,28 @@ def set_friction_of_pulse(
 
 
 @scalar
-def begin_pulse(
-    law: Law, block: Block, rises: bool, ground: float, time: float, growth: float
-) -> None:
-    """Go on from where Üg reaches Üy in a half wave; at rest the block waits for t1 (`wait`)."""
+def begin_pulse(law: Law, block: Block, base: Base, p: int, tau: float, rises: bool) -> None:
+    """Go on from where Üg reaches Üy in a half wave; at rest the block waits for t1."""
     block.in_pulse = 1
     if block.rise == NEWMARK:
         return
     if block.mode == eq.CONTINUOUS:  # for good; under a record for this pulse
         if block.phase != CONTINUOUS:
-            begin_slide(block, CONTINUOUS, time, math.inf)
+            begin_slide(block, base, p, tau, CONTINUOUS)
         return
     if block.velocity < 0.0:
         rest(block)  # upslope motion, which continuous sliding may leave, is neglected
-    if block.velocity > 0.0 or (not rises and eq4_rate_at_rest(law, block, ground) > 0.0):
-        begin_stick_slip(law, block, rises, ground, time, growth)
+    ground = max(block.amplitude * base.pieces[p].first, block.yield_acceleration)
+    if block.velocity > 0.0 or (not rises and eq4_of(law, block, ground) < ground):
+        begin_stick_slip(law, block, base, p, tau, rises, ground)
 
 
 @scalar
-def enter_rise_or_fall(law: Law, block: Block, piece: Piece, rises: bool) -> None:
+def enter_rise_or_fall(law: Law, block: Block, ground: float, rises: bool) -> None:
     """Go on at the beginning of a piece: on a rise b is max(b, Eq. 4), on a fall it is held."""
     if not rises and block.phase == FOLLOWS:
         block.phase = HELD
     elif rises and block.phase == HELD:
-        ground = block.amplitude * piece.first
         eq4 = eq4_of(law, block, ground)
         if block.rise == LITERAL or eq4 > block.held:
             block.held = eq4
@@ -883,9 +880,10 @@ def walk(
     cycle: int,
     offset: float,
     steps: Steps,
-    history: History,
+    log: np.ndarray,
 ) -> None:
     """Go through the pieces of a cycle of the path, whose times are `offset` later."""
+    base = path.base
     is_record = block.steps_on_piece > 0
     k = 0  # the positive half wave that a piece lies in, or that comes next
     for p in range(path.cycles[cycle].first, path.cycles[cycle + 1].first):
@@ -893,8 +891,7 @@ def walk(
             k += 1
         peak = block.amplitude * path.intervals[k].height if k < path.intervals.size else 0.0
         is_pulse = peak > block.yield_acceleration
-        piece = path.base.pieces[p]
-        curve = path.base.curves[piece.curve]
+        piece = base.pieces[p]
         rises = piece.top > 0.0 and piece.first <= piece.last
         starts = k < path.intervals.size and path.intervals[k].first == p
         if block.in_pulse and (starts or piece.top <= 0.0):
@@ -902,38 +899,35 @@ def walk(
         ended = piece.top == 0.0 or (starts and not is_pulse)
         if is_record and block.phase == CONTINUOUS and not block.in_pulse and ended:
             block.phase = ATTENUATES  # after the negative half wave
-        enter_rise_or_fall(law, block, piece, rises)
+        enter_rise_or_fall(law, block, block.amplitude * piece.first, rises)
 
         reaches = math.inf  # τ at which the pulse begins
         highest = block.amplitude * max(piece.first, piece.last)
         comes = piece.top > 0.0 and is_pulse and not block.in_pulse
         if comes and highest >= block.yield_acceleration:
-            reaches = (
-                place_of(block, piece, curve, block.yield_acceleration) if rises else piece.begin
-            )
-        now = offset + piece.start - piece.begin
+            reaches = place_of(block, base, p, block.yield_acceleration) if rises else piece.begin
+        block.zero = offset + piece.start - piece.begin
+        points = steps.wave[steps.first[p] : steps.first[p + 1]]
         tau = piece.begin
         for until in (min(reaches, piece.finish), piece.finish):
             waits = block.phase == STUCK and block.rise != NEWMARK and block.in_pulse == 0
             if tau < until and not waits and block.validity & NO_VALUE == 0:
                 if block.phase == ATTENUATES:
-                    attenuate(block, now + tau, until - tau, history)
+                    attenuate(block, log, block.zero + tau, until - tau)
                 else:
-                    points = steps.wave[steps.first[p] : steps.first[p + 1]]
-                    step_along(law, block, piece, curve, rises, now, tau, until, points, history)
+                    step_along(law, block, base, p, rises, tau, until, points, log)
             if until == reaches and not block.in_pulse:
                 slides = block.velocity > 0.0 and block.rise != NEWMARK
                 if block.mode == eq.STICK_SLIP and slides:
                     block.validity |= flags.NOT_RECOUPLED  # Eq. 12 has not brought it to rest
                 if is_record:
                     set_friction_of_pulse(law, block, cell, options, peak)
-                ground = max(block.amplitude * piece.first, block.yield_acceleration)
-                begin_pulse(law, block, rises, ground, now + until, piece.finish - until)
+                begin_pulse(law, block, base, p, until, rises)
             tau = until
 
 
 @scalar
-def run_out(block: Block, time: float, history: History) -> None:
+def run_out(block: Block, log: np.ndarray, time: float) -> None:
     """After the shaking Eq. 12 takes V to 0, but that of continuous sliding under a waveform."""
     end_positive_half_wave(block)
     if block.phase == STUCK or block.validity & NO_VALUE != 0:
@@ -945,7 +939,7 @@ def run_out(block: Block, time: float, history: History) -> None:
     elif block.phase == UP:
         block.held = block.upslope_yield_acceleration
     block.phase = ATTENUATES
-    attenuate(block, time, math.inf, history)
+    attenuate(block, log, time, math.inf)
 
 
 # ------------------------------------------------------------------ cycles
@@ -975,7 +969,7 @@ def repetitions(block: Block, cycle: Cycle, left: int) -> int:
     """Return how often the next cycles of that shape, at most `left`, gain what `cycle` did.
 
     They do so if they begin in the same state; and also with a larger V, if friction does not depend
-    on V and the block does not come to rest: then V is larger throughout by as much.
+    on the motion and the block does not come to rest: then V is larger throughout by as much.
     """
     if block.phase != cycle.phase or block.held != cycle.held:
         return 0
@@ -1004,14 +998,57 @@ def repeat(block: Block, cycle: Cycle, count: int) -> None:
 
 
 @single
-def walk_all(
+def walk_cycle(
+    law: Law,
+    block: Block,
+    cell: np.record,
+    options: Options,
+    path: Path,
+    cycle: int,
+    offset: float,
+    steps: Steps,
+    log: np.ndarray,
+) -> Cycle:
+    """Go through a cycle and return what the block gained in it."""
+    phase = block.phase
+    held = block.held
+    velocity = block.velocity
+    displacement = block.displacement
+    largest_velocity = block.largest_velocity
+    largest_displacement = block.largest_displacement
+    smallest_displacement = block.smallest_displacement
+    block.largest_velocity = velocity
+    block.least_velocity = velocity
+    block.largest_displacement = displacement
+    block.smallest_displacement = displacement
+    walk(law, block, cell, options, path, cycle, offset, steps, log)
+    walked = Cycle(
+        path.cycles[cycle].shape,
+        phase,
+        held,
+        velocity,
+        block.velocity - velocity,
+        block.displacement - displacement - 2.0 * math.pi * velocity,
+        block.largest_velocity - velocity,
+        block.largest_displacement - displacement,
+        block.smallest_displacement - displacement,
+        not law.knows_motion and (phase == CONTINUOUS or block.least_velocity > 0.0),
+    )
+    block.largest_velocity = max(block.largest_velocity, largest_velocity)
+    block.largest_displacement = max(block.largest_displacement, largest_displacement)
+    block.smallest_displacement = min(block.smallest_displacement, smallest_displacement)
+    return walked
+
+
+@single
+def walk_cycles(
     law: Law,
     block: Block,
     cell: np.record,
     options: Options,
     path: Path,
     steps: Steps,
-    history: History,
+    log: np.ndarray,
 ) -> None:
     """Go through all cycles; those that gain what the last one did are not walked again."""
     walked = Cycle(-1, -1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False)
@@ -1019,43 +1056,17 @@ def walk_all(
     for c in range(path.cycles.size - 1):
         left = path.repeats if path.repeats > 0 and c == path.lead else 1
         while left > 0 and block.validity & NO_VALUE == 0:
-            if walked.shape == path.cycles[c].shape and history.phases.size == 0:
+            count = 0
+            if walked.shape == path.cycles[c].shape and log.size == 0:
                 count = repetitions(block, walked, left)
-                if count > 0:
-                    repeat(block, walked, count)
-                    left -= count
-                    n += count
-                    continue
-            phase = block.phase
-            held = block.held
-            velocity = block.velocity
-            displacement = block.displacement
-            largest_velocity = block.largest_velocity
-            largest_displacement = block.largest_displacement
-            smallest_displacement = block.smallest_displacement
-            block.largest_velocity = velocity
-            block.least_velocity = velocity
-            block.largest_displacement = displacement
-            block.smallest_displacement = displacement
-            offset = 2.0 * math.pi * (n - c)
-            walk(law, block, cell, options, path, c, offset, steps, history)
-            walked = Cycle(
-                path.cycles[c].shape,
-                phase,
-                held,
-                velocity,
-                block.velocity - velocity,
-                block.displacement - displacement - 2.0 * math.pi * velocity,
-                block.largest_velocity - velocity,
-                block.largest_displacement - displacement,
-                block.smallest_displacement - displacement,
-                not law.knows_velocity and (phase == CONTINUOUS or block.least_velocity > 0.0),
-            )
-            block.largest_velocity = max(block.largest_velocity, largest_velocity)
-            block.largest_displacement = max(block.largest_displacement, largest_displacement)
-            block.smallest_displacement = min(block.smallest_displacement, smallest_displacement)
-            left -= 1
-            n += 1
+            if count > 0:
+                repeat(block, walked, count)
+            else:
+                offset = 2.0 * math.pi * (n - c)
+                walked = walk_cycle(law, block, cell, options, path, c, offset, steps, log)
+                count = 1
+            left -= count
+            n += count
 
 
 # ------------------------------------------------------------------ a cell
@@ -1077,17 +1088,9 @@ def validity_before(block: Block, cell: np.record, options: Options, path: Path)
     return uplift | interface.validity & (flags.STATICALLY_UNSTABLE | flags.LIMIT_UNDEFINED)
 
 
-@single
-def solve_cell(
-    law: Law,
-    block: Block,
-    cell: np.record,
-    options: Options,
-    path: Path,
-    steps: Steps,
-    history: History,
-) -> Motion:
-    """Step a cell through the shaking and on to rest."""
+@scalar
+def put_at_rest(block: Block, cell: np.record, options: Options) -> None:
+    """Set what is given of a cell, and a block that has not moved."""
     block.amplitude = cell.amplitude
     block.tan_theta = cell.tan_theta
     block.mu_s = cell.mu_s
@@ -1101,47 +1104,61 @@ def solve_cell(
     block.held = 0.0
     block.velocity = 0.0
     block.displacement = 0.0
+    block.slip = 0.0
     block.largest_velocity = 0.0
     block.largest_displacement = 0.0
     block.smallest_displacement = 0.0
     block.slips = 0.0
     block.stick_slip_pulses = 0.0
     block.continuous_pulses = 0.0
+    block.logged = 0
+
+
+@single
+def solve_cell(
+    law: Law,
+    block: Block,
+    cell: np.record,
+    options: Options,
+    path: Path,
+    steps: Steps,
+    log: np.ndarray,
+    result: np.ndarray,
+) -> None:
+    """Step a cell through the shaking and on to rest; `result` is (`RESULTS`,)."""
+    put_at_rest(block, cell, options)
     block.validity = validity_before(block, cell, options, path)
-    is_record = block.steps_on_piece > 0
     mode = block.mode
-    peak = block.amplitude * (max(path.highest, -path.lowest) if is_record else 1.0)
-    slides = (
-        block.amplitude * path.highest > block.yield_acceleration
-        or block.amplitude * -path.lowest > block.upslope_yield_acceleration
-    )
+    peak = block.amplitude * max(path.highest, -path.lowest)
+    slides_up = block.amplitude * -path.lowest > block.upslope_yield_acceleration
+    slides = slides_up or block.amplitude * path.highest > block.yield_acceleration
+    if slides_up and mode == eq.STUCK:
+        mode = eq.STICK_SLIP
     if block.validity & NO_VALUE == 0 and slides:
-        if not is_record and yield_governs_wave(law, block, path):
+        if block.steps_on_piece == 0 and yield_governs_wave(law, block, path.base):
             block.validity = flags.without_estimates(block.validity | flags.YIELD_GOVERNS)
-        walk_all(law, block, cell, options, path, steps, history)
+        walk_cycles(law, block, cell, options, path, steps, log)
         end = path.base.pieces[path.base.pieces.size - 1].end
-        run_out(block, end + 2.0 * math.pi * max(path.repeats - 1, 0), history)
-    sample_rest(block, math.inf, history)
-    for at in range(history.phases.size):
-        history.friction_coefficient[at] = eq.mobilised_friction(  # Eq. 1
-            history.ground_acceleration[at],
-            history.block_acceleration[at],
-            block.mu_s,
-            block.tan_theta,
-            block.g,
-        )
+        run_out(block, log, end + 2.0 * math.pi * max(path.repeats - 1, 0))
     validity = flags.settled(block.validity, block.displacement, peak)
+    if block.upslope_yield_acceleration < math.inf:
+        validity &= ~flags.UPSLOPE  # no caution for a block that slides both ways
     if validity & NO_VALUE:
-        return Motion(math.nan, math.nan, -1.0, float(validity), -1.0, -1.0, -1.0)
-    return Motion(
-        block.displacement,
-        block.largest_velocity,
-        float(mode),
-        float(validity),
-        block.slips,
-        block.stick_slip_pulses,
-        block.continuous_pulses,
-    )
+        result[:] = -1.0
+        result[0] = result[1] = math.nan
+        result[7:] = math.nan
+        result[3] = float(validity)
+        return
+    result[0] = block.displacement
+    result[1] = block.largest_velocity
+    result[2] = float(mode)
+    result[3] = float(validity)
+    result[4] = block.slips
+    result[5] = block.stick_slip_pulses
+    result[6] = block.continuous_pulses
+    result[7] = max(block.largest_displacement, block.displacement)
+    result[8] = min(block.smallest_displacement, block.displacement)
+    result[9] = result[7] - result[8]
 
 
 @single
@@ -1152,13 +1169,34 @@ def solve_cells(
     path: Path,
     blocks: np.ndarray,
     steps: Steps,
-    history: History,
+    log: np.ndarray,
     results: np.ndarray,
 ) -> None:
     """Step the cells of a tile with a friction law, as `solve_steps` does with that of the paper."""
     for j in range(cells.size):
-        motion = solve_cell(law, blocks[0], cells[j], options, path, steps, history)
-        flags.store(motion, j, results)
+        solve_cell(law, blocks[0], cells[j], options, path, steps, log, results[:, j])
+
+
+@kernel
+def solve_steps(
+    cells: np.ndarray,
+    options: Options,
+    path: Path,
+    blocks: np.ndarray,
+    steps: Steps,
+    log: np.ndarray,
+    results: np.ndarray,
+) -> None:
+    """Step the cells of a tile with the friction law of the paper.
+
+    `cells` are of dtype `STEP_CELL`; `blocks`, (1,), says how they are stepped (`blocks_of`); `log`
+    is of dtype `LOG`, empty if no history is asked for; `results` is (`RESULTS`, cells).
+    """
+    law = Law(exponential_friction, False, False)
+    solve_cells(law, cells, options, path, blocks, steps, log, results)
+
+
+# ------------------------------------------------------------------ for callers in Python
 
 
 def steps_of(path: Path, rule: int, steps: int, steps_on_piece: int) -> Steps:
@@ -1195,33 +1233,41 @@ def blocks_of(rule: int, steps: int, steps_on_piece: int) -> np.ndarray:
     return blocks
 
 
-def history_of(phases: np.ndarray, ground_acceleration: np.ndarray) -> History:
-    """Return a history to be filled in at increasing phases, of a block that rests so far."""
-    return History(
-        phases,
-        ground_acceleration,
-        ground_acceleration.copy(),
-        np.zeros(phases.size),
-        np.zeros(phases.size),
-        np.zeros(phases.size),
-        np.zeros(1, np.int64),
-    )
+def samples_of(
+    log: np.ndarray, phases: NDArray[np.float64], ground: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return Ü, V and W at phases, (samples,), from the steps of a log; `ground` is Üg there.
 
-
-@kernel
-def solve_steps(
-    cells: np.ndarray,
-    options: Options,
-    path: Path,
-    blocks: np.ndarray,
-    steps: Steps,
-    history: History,
-    results: np.ndarray,
-) -> None:
-    """Step the cells of a tile with the friction law of the paper.
-
-    `cells` are of dtype `STEP_CELL`; `blocks`, (1,), says how they are stepped; `results` is (fields
-    of `Motion`, cells).
+    In a step V is the cubic through its values and rates at both ends, and Ü a parabola.
     """
-    law = Law(exponential_friction, False, False)
-    solve_cells(law, cells, options, path, blocks, steps, history, results)
+    before = np.zeros(1, LOG)
+    before["time"] = -np.inf
+    before["step"] = 1.0
+    rows = np.concatenate([before, log])
+    at = np.searchsorted(rows["time"], phases, side="right") - 1
+    # a block rests from the end of a step on, if the next one begins from rest
+    goes_on = np.append(rows["velocity"][1:] != 0.0, rows["phase"][-1] == CONTINUOUS)[at]
+    row = rows[at]
+    step = row["step"]
+    since = phases - row["time"]
+    rests = (since > step) & ~goes_on
+    part = np.clip(since / np.maximum(step, np.finfo(float).tiny), 0.0, 1.0)
+    gained = row["gained"]
+    first = row["first_rate"] * step
+    last = row["last_rate"] * step
+    velocity = (
+        row["velocity"]
+        + gained * part**2 * (3.0 - 2.0 * part)
+        + first * part * (1.0 - part) ** 2
+        - last * part**2 * (1.0 - part)
+    )
+    displacement = row["displacement"] + step * (
+        row["velocity"] * part
+        + gained * (part**3 - 0.5 * part**4)
+        + first * part**2 * (0.5 - 2.0 / 3.0 * part + 0.25 * part**2)
+        - last * part**3 * (1.0 / 3.0 - 0.25 * part)
+    )
+    bend = 2.0 * (row["first"] + row["last"] - 2.0 * row["middle"])
+    block = row["first"] + part * (row["last"] - row["first"] - bend) + part**2 * bend
+    block = np.where(row["phase"] == ATTENUATES, ground - row["first_rate"], block)
+    return np.where(rests, ground, block), np.where(rests, 0.0, velocity), displacement

@@ -18,7 +18,6 @@ from slipsweep.kernels.block import (
     KD_NOT_POSITIVE,
     LITERAL,
     MONOTONE,
-    NEWMARK,
 )
 from slipsweep.kernels.eq4 import (
     Block,
@@ -67,12 +66,11 @@ class Place(NamedTuple):
 def rising_acceleration(block: Block, held: float, x: float) -> float:
     """Return b of a block that slides, as the base comes to x and does not fall: option `rise`.
 
-    Monotone: b = max(b, E).  Literal: b = E.  Newmark's block: b = Üy.  At the onset, with Üy for
-    the b before, it is c(x).
+    Monotone: b = max(b, E).  Literal: b = E.  At the onset, with Üy for the b before, it is c(x).
     """
     if block.rise == MONOTONE:
         return max(held, response(block, x))
-    return response(block, x) if block.rise == LITERAL else block.yield_acceleration
+    return response(block, x)
 
 
 @inlined
@@ -104,7 +102,7 @@ def onset(block: Block, x: float, top: float) -> float:
 
     The first D > 0; `top`, if there is none.
     """
-    if block.rise == NEWMARK or relative_acceleration(block, inside(x, top)) > 0.0:
+    if relative_acceleration(block, inside(x, top)) > 0.0:
         return x
     for _ in range(MOST_STAGES):
         if x >= top:
@@ -131,12 +129,9 @@ class Stage(NamedTuple):
 def next_stage(block: Block, x: float, top: float, held: float, follows: bool) -> Stage:
     """Return the next stage of a slide on the rise from x to `top`: option `rise`.
 
-    Newmark's block: b is held to the top.  Literal: b follows Eq. 4 throughout.  Monotone, b =
-    max(b, E): b is held until E comes to it, and follows E until that falls.  A stage that follows
-    Eq. 4 ends where D changes its sign, too.
+    Literal: b follows Eq. 4 throughout.  Monotone, b = max(b, E): b is held until E comes to it,
+    and follows E until that falls.  A stage that follows Eq. 4 ends where D changes its sign, too.
     """
-    if block.rise == NEWMARK:
-        return Stage(top, False, False)
     end = top
     inner = inside(x, end)
     bends = inner < inflection(block)

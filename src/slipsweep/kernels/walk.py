@@ -20,7 +20,6 @@ from slipsweep.kernels.block import (
     LIMIT_UNDEFINED,
     MONOTONE,
     NEAR_MODE_LIMIT,
-    NEWMARK,
     NO_VALUE,
     NOT_RECOUPLED,
     STATICALLY_UNSTABLE,
@@ -145,8 +144,6 @@ def flags_of_pulse(
     cell: Cell, block: Block, interface: Interface, continuous: bool, peak: float
 ) -> int:
     """Return the flags of a pulse of a record, with that peak."""
-    if block.rise == NEWMARK:
-        return 0
     flags = remarks_on(cell, interface.acceleration_ratio)
     flags |= interface.validity & FRICTION_NOT_DECAYING
     monotone = block.rise == MONOTONE and not continuous
@@ -284,7 +281,7 @@ def walk_pulses(
         if path.recorded:
             peak = cell.amplitude * interval.height
             block, interface = block_in_pulse(cell, peak, options)
-            continuous = options.rise != NEWMARK and peak > interface.limiting_acceleration
+            continuous = peak > interface.limiting_acceleration
             walk.validity |= flags_of_pulse(cell, block, interface, continuous, peak)
             if walk.validity & NO_VALUE:
                 break
@@ -307,7 +304,7 @@ def walk_pulses(
                 block, recoupling, path.base, start, interval.end, ends, slide, log
             )
             slides_on = slide.velocity > 0.0 and flags == 0 and following < path.intervals.size
-            if slides_on and block.rise != NEWMARK:
+            if slides_on:
                 flags = NOT_RECOUPLED
         if log.size and slide.logged > log.size:
             slide.logged = logged
@@ -414,7 +411,7 @@ def validity_before(
         # n = g + Üg tan θ is least where the base's acceleration is lowest
         validity = interface.validity & (STATICALLY_UNSTABLE | LIMIT_UNDEFINED)
         normal = eq.normal_acceleration(cell.amplitude * path.lowest, cell.tan_theta, options.g)
-        return validity | (UPLIFT if normal <= 0.0 and options.rise != NEWMARK else 0)
+        return validity | (UPLIFT if normal <= 0.0 else 0)
     # ramps may keep the shaking below its peak, and a block from sliding
     if block.amplitude * path.highest <= block.yield_acceleration:
         return interface.validity & ~(NEAR_MODE_LIMIT | FRICTION_ESTIMATED)

@@ -65,7 +65,8 @@ class Newmark(Choice):
     ----------
     sliding : {"downslope", "both"}
         Directions in which it slides.  With "both" its acceleration is −Üy,up while it slides
-        upslope (`upslope_yield_acceleration`); displacements may then be negative.
+        upslope (`upslope_yield_acceleration`); displacements may then be negative, and what counts
+        them, statistics and charts, takes |u|.
     g : float
         Gravity, m/s².
 
@@ -162,12 +163,6 @@ Model = Mendez | Newmark
 def slides_both_ways(model: Model) -> bool:
     """Return whether the model is Newmark's block that slides downslope and upslope."""
     return isinstance(model, Newmark) and model.sliding == "both"
-
-
-def check_one_way(name: str, sliding: object) -> None:
-    """Refuse what takes displacements in one direction only."""
-    if sliding == "both":
-        raise InputError(f"{name}: not allowed with sliding = 'both', only with 'downslope'")
 
 
 Solver = Cycle | Step

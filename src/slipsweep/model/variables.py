@@ -5,6 +5,7 @@
 figures all take their words from here.
 """
 
+from collections.abc import Mapping
 from enum import IntEnum, IntFlag, StrEnum
 from typing import Any, Self
 
@@ -174,6 +175,17 @@ class LimitStatus(_Status):
     INVALID = 5, "the model gives no value at any amplitude (no limit)"
 
 
+class StrengthStatus(_Status):
+    """How a required strength was found, or why there is none."""
+
+    SOLVED = 0, "the displacement at the required strength is the tolerable one"
+    ALWAYS_WITHIN = (
+        1,
+        "not exceeded at any strength, as where nothing slides: static equilibrium is enough",
+    )
+    NEVER_WITHIN = 2, "exceeded at every strength (no required strength)"
+
+
 class SensitivityStatus(_Status):
     """Whether there are Sobol indices, or why there are none."""
 
@@ -269,9 +281,7 @@ STRENGTHS = ("amplitude", "scale", "pgv", "arias_intensity")
 
 #: Inputs that may be drawn: all that the displacement depends on.
 DRAWN = tuple(
-    name
-    for name in PARAMETERS
-    if name not in ("structure_frequency", "polarity", "azimuth", "upslope_yield_acceleration")
+    name for name in PARAMETERS if name not in ("structure_frequency", "polarity", "azimuth")
 )
 
 #: Results of Newmark's block that slides both ways: extremes of u over time.
@@ -282,6 +292,12 @@ EXTREMES: dict[str, dict[str, Any]] = {
     "smallest_displacement": _cf(
         "m", "smallest relative displacement over time, downslope", "validity", comment=_DIRECTION
     ),
+}
+
+#: Results of Newmark's block that slides both ways, not of others; the last on request.
+BOTH_WAYS: dict[str, dict[str, Any]] = {
+    **EXTREMES,
+    "clearance": _cf("m", "clearance, largest less smallest displacement over time", "validity"),
 }
 
 #: Results of a sweep: attributes of the variables.
@@ -295,7 +311,7 @@ RESULTS: dict[str, dict[str, Any]] = {
     "newmark_displacement": _cf(
         "m", "permanent displacement of Newmark's block, downslope", "validity", comment=_DIRECTION
     ),
-    **EXTREMES,
+    **BOTH_WAYS,
     "yield_acceleration": _cf("m s-2", "yield acceleration"),
     "limiting_acceleration": _cf("m s-2", "limiting acceleration (Eq. 7)"),
     "acceleration_ratio": _cf("1", "peak ground over limiting acceleration"),
@@ -337,7 +353,7 @@ RECORD_COUNTS: dict[str, dict[str, Any]] = {
 RECORD_RESULTS: dict[str, dict[str, Any]] = {
     **{name: RESULTS[name] for name in ("permanent_displacement", "peak_relative_velocity")},
     **RECORD_COUNTS,
-    **{name: RESULTS[name] for name in ("validity", "newmark_displacement", *EXTREMES)},
+    **{name: RESULTS[name] for name in ("validity", "newmark_displacement", *BOTH_WAYS)},
     "motion_factor": _cf("1", "factor on the recorded acceleration"),
 }
 
@@ -434,6 +450,51 @@ SUITE_STATISTICS: dict[str, dict[str, Any]] = {
     "exceedance_probability": STATISTICS["exceedance_probability"],
 }
 
+#: Inputs that `required_strength` may solve for, and the attributes of what it finds.
+REQUIRED_STRENGTHS: dict[str, dict[str, Any]] = {
+    "yield_coefficient": _cf("1", "required yield coefficient", "required_status"),
+    "mu_s": _cf("1", "required static friction coefficient", "required_status"),
+    "phi": _cf("degree", "required friction angle of the interface", "required_status"),
+}
+
+#: Results of `required_strength`: of each motion or sample, or of all of them together.
+REQUIRED_RESULTS: dict[str, dict[str, Any]] = {
+    **{f"required_{name}": about for name, about in REQUIRED_STRENGTHS.items()},
+    "required_status": _coded("how the required strength was found", StrengthStatus),
+    **{
+        f"required_{name}_quantile": _cf(
+            about["units"],
+            f"quantile of the {about['long_name']}",
+            "always_within_count never_within_count",
+        )
+        for name, about in REQUIRED_STRENGTHS.items()
+    },
+    "always_within_count": _cf("1", "number that stay within at every strength"),
+    "never_within_count": _cf("1", "number that stay within at no strength"),
+}
+
+
+def has_signed_displacements(attributes: Mapping[Any, Any]) -> bool:
+    """Return whether displacements of a result with these attributes may be negative by design."""
+    return bool(attributes.get("sliding") == "both")
+
+
+def counted_text(text: str, attributes: Mapping[Any, Any]) -> str:
+    """Return words for what is counted of permanent displacements: |u|, where u has signs.
+
+    `attributes` are those of the result.
+    """
+    is_of_displacement = "permanent displacement" in text.lower()
+    if is_of_displacement and has_signed_displacements(attributes):
+        return f"{text}, by magnitude |u|"
+    return text
+
+
+def counted(about: Mapping[str, Any], attributes: Mapping[Any, Any]) -> dict[str, Any]:
+    """Return the attributes of a statistic with the words of `counted_text`."""
+    return {**about, "long_name": counted_text(str(about["long_name"]), attributes)}
+
+
 #: The mean annual rate at which a displacement is exceeded, and its parts that lie outside of the
 #: grid's amplitudes.
 HAZARD_RESULTS: dict[str, dict[str, Any]] = {
@@ -472,9 +533,15 @@ RESULT_DTYPES: dict[str, str] = {
     "half_wave_mode": "int8",
     "validity": "int16",
     "limit_status": "int8",
+    "required_status": "int8",
+    "always_within_count": "int32",
+    "never_within_count": "int32",
     "sensitivity_status": "int8",
     **dict.fromkeys(RECORD_COUNTS, "int32"),
 }
+
+#: Displacements that may be negative where a block slides both ways.
+SIGNED = ("permanent_displacement", *EXTREMES)
 
 #: What `sweep` returns where no variables are named; of a suite also the factor on each motion.
 DEFAULT_RESULTS = ("permanent_displacement", "peak_relative_velocity", "sliding_mode", "validity")

@@ -20,6 +20,7 @@ from slipsweep.motion.intensity import spacing_of
 from slipsweep.motion.paths import TERMS, Path, path_of
 from slipsweep.motion.pieces import Wave, pieces_of, wave_of_pieces
 from slipsweep.motion.records import Record
+from slipsweep.motion.samples import Samples, samples_of
 from slipsweep.motion.waveforms import Harmonics, Waveform
 
 #: Longest piece of a smooth wave, in radians of its fastest harmonic: the first term of its Taylor
@@ -273,3 +274,9 @@ def wave_of_record(record: Record, polarity: float) -> Wave:
 def path_of_record(record: Record, polarity: float) -> Path:
     """Return the path of a record: w in m/s², and time in place of the phase."""
     return path_of(wave_of_record.__wrapped__(record, polarity), recorded=True)
+
+
+@functools.lru_cache(maxsize=MOST_TABLES)
+def samples_of_record(record: Record, polarity: float) -> Samples:
+    """Return the samples of a record as the kernel of Newmark's block takes them."""
+    return samples_of(record.times, polarity * record.acceleration)

@@ -132,7 +132,7 @@ def values_at(path: Path, phases: NDArray[np.float64]) -> NDArray[np.float64]:
     row = cycle
     if not path.recorded:
         cycles = path.cycles.size - 1 + repeated
-        cycle = np.clip(np.floor(phases / (2.0 * np.pi)).astype(np.int64), 0, cycles - 1)
+        cycle = np.clip(np.floor(phases / (2.0 * np.pi)), 0, cycles - 1).astype(np.int64)
         row = np.where(cycle < path.lead, cycle, np.maximum(cycle - repeated, path.lead))
     inside = phases - 2.0 * np.pi * (cycle - row)
     p = np.searchsorted(pieces["start"], inside, side="right") - 1

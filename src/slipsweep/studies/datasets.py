@@ -139,7 +139,7 @@ def sweep(
         `validity` (these by default), `newmark_displacement` (of Newmark's block on the same cells,
         with the same yield acceleration), the parameters of Eqs. 7-11, and `amplitude`.  With
         ``Newmark(sliding="both")`` also `largest_displacement` and `smallest_displacement`, the
-        extremes of u over time (m; by default, too).  Under a
+        extremes of u over time (m; by default, too), and `clearance`, their difference.  Under a
         record `sliding_mode` gives way to `number_of_slips` (that begin at rest),
         `stick_slip_pulses` and `continuous_pulses` (by Eq. 7 with each pulse's own peak: an
         extension of the paper's harmonic motion), the parameters and `amplitude` to

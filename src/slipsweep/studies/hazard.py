@@ -18,7 +18,14 @@ import xarray as xr
 from slipsweep.errors import InputError, RunError
 from slipsweep.model.parameters import check_numbers, number_text, shown
 from slipsweep.model.units import conversion
-from slipsweep.model.variables import HAZARD_RESULTS, PARAMETERS, PUBLISHED_RESULTS, STRENGTHS
+from slipsweep.model.variables import (
+    HAZARD_RESULTS,
+    PARAMETERS,
+    PUBLISHED_RESULTS,
+    STRENGTHS,
+    counted,
+    counted_text,
+)
 from slipsweep.motion.lines import read_columns, read_lines
 from slipsweep.studies.published_statistics import published_statistics
 from slipsweep.studies.sampling import Floats, Thresholds
@@ -525,13 +532,18 @@ def displacement_hazard(
             why = "each block slides under its own weight"
         raise RunError(f"no annual rate: {why}")
     for name, one in results.items():
-        one.attrs = (HAZARD_RESULTS | PUBLISHED_RESULTS)[name]
+        one.attrs = counted((HAZARD_RESULTS | PUBLISHED_RESULTS)[name], found.attrs)
     coords = {
         name: one.variable
         for name, one in found.coords.items()
         if "amplitude" not in (*one.dims, name)
     }
     found.attrs.pop("zero_displacement", None)
-    attrs = {**found.attrs, "title": TITLE, "hazard_curve": curve.name, **curve.attrs}
+    attrs = {
+        **found.attrs,
+        "title": counted_text(TITLE, found.attrs),
+        "hazard_curve": curve.name,
+        **curve.attrs,
+    }
     ranges = {"hazard_curve_range": curve.amplitude[[0, -1]], "amplitude_range": amplitude[[0, -1]]}
     return xr.Dataset(results, coords, attrs | ranges)

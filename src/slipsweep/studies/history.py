@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError
 from slipsweep.grid import engine, plans, resources, solvers
 from slipsweep.grid import inputs as grid_inputs
-from slipsweep.kernels import history as kernels
 from slipsweep.kernels import step
-from slipsweep.kernels.block import Cell, Motion
+from slipsweep.kernels.history import History
+from slipsweep.model import equations as eq
 from slipsweep.model import options, parameters, variables
 from slipsweep.model.variables import HISTORY
 from slipsweep.motion import cutting
@@ -49,6 +49,7 @@ def simulate(
     polarity: int | None = None,
     yield_acceleration: float | None = None,
     yield_coefficient: float | None = None,
+    upslope_yield_acceleration: float | None = None,
     decay_rate: float | None = None,
     delta_mu: float | None = None,
     minimum_friction: float | None = None,
@@ -114,13 +115,13 @@ def simulate(
         polarity=polarity,
         yield_acceleration=yield_acceleration,
         yield_coefficient=yield_coefficient,
+        upslope_yield_acceleration=upslope_yield_acceleration,
         decay_rate=decay_rate,
         delta_mu=delta_mu,
         minimum_friction=minimum_friction,
         structure_frequency=structure_frequency,
     )
     problem = grid_inputs.check_problem(excitation, model, solver)
-    options.check_one_way("simulate", getattr(problem.model, "sliding", None))
     motion = problem.excitation
     if isinstance(motion, Suite):
         one_motion = f"suite[{motion.labels[0]!r}]{'.rotated(azimuth)' if motion.has_pairs else ''}"
@@ -166,7 +167,7 @@ class _History:
         self.summary = summary
         given = engine.cell_inputs(problem, inputs)
         motion = problem.excitation
-        self.cell = Cell(*(float(given.get(name, math.nan)) for name in Cell._fields))
+        self.fields = {name: float(value) for name, value in given.items()}
         self.options = solvers.options_of(problem, wants_peak=True)
         self.record = motion if isinstance(motion, Record) else None
         if self.record is not None:
@@ -193,25 +194,27 @@ class _History:
         polarity = 1.0 if self.record is None else float(self.inputs["polarity"])
         stepper = solvers.stepper_of(self.problem, self.options, polarity)
         cells = np.full((1, len(step.STEP_CELL.names or ())), math.nan).view(step.STEP_CELL)[:, 0]
-        for name, value in zip(Cell._fields, self.cell, strict=True):
+        for name, value in self.fields.items():
             cells[name] = value
-        table[0] = self.cell.amplitude * values_at(self.path, phases)
-        history = step.history_of(phases, table[0])
-        _interruptible(stepper, cells, history, np.empty((len(Motion._fields), 1)))
-        table[1] = history.block_acceleration
-        table[2] = history.friction_coefficient
-        table[3] = history.velocity
-        table[4] = history.displacement
+        results = np.empty((len(step.RESULTS), 1))
+        # once to count the steps, once to note them
+        counted = _interruptible(stepper, cells, np.empty(1, step.LOG), results)
+        log = np.empty(int(counted["logged"]), step.LOG)
+        _interruptible(stepper, cells, log, results)
+        table[0] = self.fields["amplitude"] * values_at(self.path, phases)
+        table[1], table[3], table[4] = step.samples_of(log, phases, table[0])
+        table[2] = eq.mobilised_friction(
+            table[0],
+            table[1],
+            self.fields.get("mu_s", math.nan),
+            self.fields.get("tan_theta", math.nan),
+            self.options.g,
+        )
 
     def _walk(self, phases: Floats, table: Floats) -> None:
         """Fill in a history from event to event."""
         _interruptible(
-            kernels.fill_history,
-            self.cell,
-            self.options,
-            self.path,
-            phases,
-            kernels.History(*table),
+            solvers.fill_history, self.problem, self.fields, self.path, phases, History(*table)
         )
 
     def columns(self, phases: Floats) -> dict[str, xr.Variable]:
@@ -240,7 +243,7 @@ class _History:
         if self.record is None:
             return {}
         with np.errstate(over="ignore"):
-            peak = self.path.intervals["height"] * self.cell.amplitude
+            peak = self.path.intervals["height"] * self.fields["amplitude"]
         given = {**self.inputs, "amplitude": xr.Variable("half_wave", peak)}
         request = engine.Request(self.problem, {"half_wave": peak.size}, given, ("sliding_mode",))
         mode = engine.friction_parameters(request)["sliding_mode"].values
@@ -299,16 +302,15 @@ class _History:
         return np.concatenate([shaken, shaken[-1] + rest])
 
 
-def _interruptible(kernel: Callable[..., None], *args: Any) -> None:
+def _interruptible(kernel: Callable[..., Any], *args: Any) -> Any:
     """Run a kernel on a thread: the main thread hears Ctrl-C while it waits, and a daemon does not hold up the exit."""
-    done: Future[None] = Future()
+    done: Future[Any] = Future()
 
     def run() -> None:
         try:
-            kernel(*args)
-            done.set_result(None)
+            done.set_result(kernel(*args))
         except BaseException as error:  # raised where the result is waited for
             done.set_exception(error)
 
     threading.Thread(target=run, daemon=True).start()
-    done.result()
+    return done.result()

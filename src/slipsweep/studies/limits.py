@@ -28,7 +28,7 @@ from slipsweep.model import options, parameters, units, variables
 from slipsweep.model.variables import LimitStatus, Validity
 from slipsweep.motion.cutting import wave_of_record
 from slipsweep.motion.records import Record
-from slipsweep.studies import datasets
+from slipsweep.studies import criterion, datasets
 from slipsweep.studies.datasets import Values
 
 Floats = NDArray[np.float64]
@@ -72,6 +72,7 @@ def limit_amplitude(
     azimuth: Values | None = None,
     yield_acceleration: Values | None = None,
     yield_coefficient: Values | None = None,
+    upslope_yield_acceleration: Values | None = None,
     decay_rate: Values | None = None,
     delta_mu: Values | None = None,
     minimum_friction: Values | None = None,
@@ -93,7 +94,8 @@ def limit_amplitude(
     `amplitude_steps` equal ratios, finer where it may hide a peak, and has both sides of the change
     of mode.  A peak narrower than a part of a step can be missed.  Under a record the amplitude is
     that peak ground acceleration to which it is scaled, and the scan has both sides of every
-    amplitude at which one of its 128 highest pulses begins to count, or changes its mode.
+    amplitude at which one of its 128 highest pulses begins to count, or changes its mode.  Of a
+    block that slides both ways the largest ``|u|`` over time is to reach the displacement.
 
     Parameters
     ----------
@@ -117,7 +119,8 @@ def limit_amplitude(
           numbers, with and without a change of sliding mode), 3 after_gap (no value just below), 4
           not_reached, 5 invalid (no value anywhere).
         - `permanent_displacement`, m, and `sliding_mode` (under a record the counts of slips and pulses) at the
-          limit; more than `displacement` where a discontinuity of the model sets the limit.
+          limit; more than `displacement` where a discontinuity of the model sets the limit.  Of a
+          block that slides both ways also `largest_displacement` and `smallest_displacement`.
         - `validity` at the limit or, where there is none, at `maximum_amplitude`.
 
     Raises
@@ -147,6 +150,7 @@ def limit_amplitude(
         azimuth=azimuth,
         yield_acceleration=yield_acceleration,
         yield_coefficient=yield_coefficient,
+        upslope_yield_acceleration=upslope_yield_acceleration,
         decay_rate=decay_rate,
         delta_mu=delta_mu,
         minimum_friction=minimum_friction,
@@ -176,25 +180,9 @@ def plan_limits(
 ) -> Plan:
     """Plan of `limit_amplitude`, as which parameters and errors are; `inputs` have no strength of the shaking."""
 
-    def in_m(given: Any) -> Any:
-        return (
-            units.quantity("displacement", given, "m", math.nan)
-            if isinstance(given, str)
-            else given
-        )
-
-    displacement = (
-        [in_m(one) for one in displacement]
-        if isinstance(displacement, list)
-        else in_m(displacement)
-    )
-    values = parameters.check_values("displacement", displacement)
-    dims = getattr(displacement, "dims", ("displacement",) * values.ndim)
-    if not values.size or len({*dims}) < values.ndim:
-        raise InputError(
-            f"displacement = {parameters.shown(displacement)}: must be a number, a list, or a DataArray, not empty"
-        )
-    target = xr.Variable(dims, values, variables.TOLERABLE_DISPLACEMENT)
+    target = check_displacement(displacement)
+    dims = target.dims
+    values = target.values
     steps = parameters.check_whole("amplitude_steps", amplitude_steps, 2, 1_000_000)
     # displacement and amplitude change places: in the layout of the grid it stands where the
     # amplitude would
@@ -202,7 +190,6 @@ def plan_limits(
     plan = plan_sweep(
         swapped, excitation=excitation, model=model, variables=["permanent_displacement"]
     )
-    options.check_one_way("limit_amplitude", plan.attrs.get("sliding"))
     ((_, request),) = plan.tasks
     if maximum_amplitude is None:
         maximum_amplitude = variables.MAXIMUM_AMPLITUDE_IN_G * request.problem.model.g
@@ -213,7 +200,8 @@ def plan_limits(
     scaled = {dim: size for dim, size in plan.sizes.items() if dim not in blocks}
     # in which mode a block slides, or in how many pulses of a record
     codes = variables.RECORD_COUNTS if "time_scale" in solved else ("sliding_mode",)
-    names = (*variables.LIMIT_RESULTS, *codes, "validity")
+    extremes = variables.EXTREMES if options.slides_both_ways(request.problem.model) else ()
+    names = (*variables.LIMIT_RESULTS, *extremes, *codes, "validity")
     request = replace(request, inputs=solved, wanted=names)
     return replace(
         plan,
@@ -226,6 +214,7 @@ def plan_limits(
             "title": TITLE,
             "maximum_amplitude": highest,
             "amplitude_steps": steps,
+            **criterion.attributes_of(request.problem.model),
         },
         # one scan of a block serves all its targets, each of which takes some 100 cells in addition
         cost=plan.cost * (max(1.0, steps / math.prod(scaled.values())) + 100.0),
@@ -234,6 +223,29 @@ def plan_limits(
         cell_memory=60,
         described=variables.RESULTS | variables.RECORD_COUNTS | variables.LIMIT_RESULTS,
     )
+
+
+def check_displacement(displacement: Any) -> xr.Variable:
+    """Return tolerable displacements, m, or with a unit, as a coordinate (InputError: not > 0)."""
+
+    def in_m(length: Any) -> Any:
+        if isinstance(length, str):
+            return units.quantity("displacement", length, "m", math.nan)
+        return length
+
+    lengths = (
+        [in_m(length) for length in displacement]
+        if isinstance(displacement, list)
+        else in_m(displacement)
+    )
+    values = parameters.check_values("displacement", lengths)
+    dims = getattr(lengths, "dims", ("displacement",) * values.ndim)
+    if not values.size or len({*dims}) < values.ndim:
+        raise InputError(
+            f"displacement = {parameters.shown(lengths)}: must be a number, a list, or a DataArray"
+            ", not empty"
+        )
+    return xr.Variable(dims, values, variables.TOLERABLE_DISPLACEMENT)
 
 
 def _solve(maximum_amplitude: float, steps: int, request: Request) -> Variables:
@@ -262,12 +274,12 @@ def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> dict[
         values[:] = math.nan if values.dtype.kind == "f" else variables.SlidingMode.MISSING
     # without a limit the validity at the maximum amplitude says why
     results["validity"][:] = scan.found["validity"][:, -1]
-    valueless = np.isnan(scan.found["permanent_displacement"]).all(axis=1)
+    valueless = np.isnan(scan.displacements).all(axis=1)
     results["limit_status"][:] = np.where(valueless, LimitStatus.INVALID, LimitStatus.NOT_REACHED)
     for name, values in {**after, "limit_amplitude": high}.items():
         results[name][cell] = values
-    below = before["permanent_displacement"]
-    above = after["permanent_displacement"]
+    below = criterion.displacement_of(before)
+    above = criterion.displacement_of(after)
     jumps = above - below > JUMP * above
     modes = [
         name for name in ("sliding_mode", "stick_slip_pulses", "continuous_pulses") if name in after
@@ -293,7 +305,8 @@ class Scan:
         # are solved once
         every = inputs | {"amplitude": amplitudes}
         slips = ("number_of_slips",) if isinstance(self.problem.excitation, Record) else ()
-        wanted = ("permanent_displacement", "validity", *slips)
+        self.moved = criterion.results_of(self.problem.model)
+        wanted = (*self.moved, "validity", *slips)
         found = engine.solve(Request(self.problem, grid_sizes(every), every, wanted))
         full = {**request.sizes, _ALONG: amplitudes.sizes[_ALONG]}
         #: Results and amplitudes, (cell, amplitude).
@@ -302,6 +315,8 @@ class Scan:
             for name, one in (*found.items(), ("amplitude", amplitudes))
         }
         self.amplitudes = self.found["amplitude"]
+        #: Displacements that are compared with those to be reached, (cell, amplitude).
+        self.displacements = criterion.displacement_of(self.found)
         #: Displacements to be reached, (cell,).
         self.targets = displacement.set_dims(request.sizes).values.ravel()
         #: Inputs but for the amplitude: one value for each cell, or one for all.
@@ -326,7 +341,7 @@ class Scan:
 
     def reach(self, amplitude: Floats, cell: Indices) -> NDArray[np.bool_]:
         """Whether some cells reach their targets at amplitudes of their own."""
-        moved = self.solve(amplitude, cell, ("permanent_displacement",))["permanent_displacement"]
+        moved = criterion.displacement_of(self.solve(amplitude, cell, self.moved))
         return np.asarray(moved >= self.targets[cell].reshape(-1, *(1,) * (amplitude.ndim - 1)))
 
 
@@ -349,6 +364,11 @@ def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) 
     # not depend on A
     thresholds = np.stack([found[name].values.ravel() for name in wanted], axis=1)
     yields = thresholds[:, :1]
+    if options.slides_both_ways(problem.model):
+        arrays = {name: one.set_dims(sizes).values for name, one in blocks.items()}
+        upslope = engine.cell_inputs(problem, arrays)["upslope_yield_acceleration"]
+        lowest = np.minimum(yields, np.broadcast_to(upslope, [*sizes.values()]).reshape(-1, 1))
+        yields = np.where(yields > 0.0, lowest, yields)
     # without a yield acceleration there is no value at any amplitude
     start = np.minimum(np.where(yields > 0.0, yields, maximum_amplitude), maximum_amplitude)
     with np.errstate(over="ignore"):
@@ -382,7 +402,7 @@ def _heights(request: Request) -> Floats:
 
 def _limits(scan: Scan) -> Steps:
     """The lowest neighbouring amplitudes between which cells reach their targets, of those cells that do."""
-    reaches = scan.found["permanent_displacement"] >= scan.targets[:, np.newaxis]
+    reaches = scan.displacements >= scan.targets[:, np.newaxis]
     reached = np.logical_or.accumulate(reaches, axis=1)
     # the scan begins at yield, where no block has moved: there is always a step before
     before = ~reached[:, :-1]
@@ -412,7 +432,7 @@ def _hidden_peaks(scan: Scan, before: NDArray[np.bool_]) -> Iterator[Steps]:
     # blocks that do not recouple: u jumps up each time that they come to rest one pulse earlier,
     # and then falls
     saw, parts = (0.7, 128) if isinstance(scan.problem.excitation, Record) else (0.5, 512)
-    moved = scan.found["permanent_displacement"]
+    moved = scan.displacements
     slides_on = scan.found["validity"] & Validity.NOT_RECOUPLED.value != 0
     # the part of a target from which on a point may lie next to a peak, and a maximum of the scan
     # to a higher one
@@ -447,7 +467,7 @@ def _at_change(
     The place of the change is located, to a `part` of the step, where u on either side of it is
     `least` of the target.
     """
-    moved = scan.found["permanent_displacement"]
+    moved = scan.displacements
     states = scan.found[result] & bits
     cell, step = np.nonzero(states[:, 1:] != states[:, :-1])
     higher = np.maximum(moved[cell, step + 1], moved[cell, step])

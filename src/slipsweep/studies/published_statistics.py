@@ -218,10 +218,12 @@ def published_table(
     # in the order of the result; axes of one value are said elsewhere
     axes = [str(dim) for dim in result.dims if whole.sizes.get(dim, 1) > 1]
     single = [dim for dim in whole.dims if dim not in (*axes, "displacement of")]
-    laid = whole.squeeze(single, drop=True).assign_coords({dim: _axis(result, dim) for dim in axes})
+    laid = whole.squeeze(single, drop=True).assign_coords(
+        {dim: axis_labels_of(result, dim) for dim in axes}
+    )
     table = laid.to_dataframe([*axes, "displacement of"]).reset_index()
     table["range"] = np.where(table["range"] == 0, "outside", "")
-    return table.rename(columns={dim: _title(result, dim) for dim in axes})
+    return table.rename(columns={dim: axis_title(result, dim) for dim in axes})
 
 
 def _columns(found: xr.Dataset, exceeded: bool) -> xr.Dataset:
@@ -275,7 +277,7 @@ def _number(value: float, as_text: str) -> str:
     return "none" if np.isnan(value) else format(value, as_text)
 
 
-def _axis(result: xr.Dataset, dim: str) -> list[Any]:
+def axis_labels_of(result: xr.Dataset, dim: str) -> list[Any]:
     """Places along an axis: numbers, peak ground accelerations in g, or labels."""
     if dim in result.variables and result[dim].dtype.kind in "iuf":
         factor = float(result.attrs["g"]) if dim == "amplitude" else 1.0
@@ -283,7 +285,7 @@ def _axis(result: xr.Dataset, dim: str) -> list[Any]:
     return labels_along(result, dim)
 
 
-def _title(result: xr.Dataset, dim: str) -> str:
+def axis_title(result: xr.Dataset, dim: str) -> str:
     """The title of an axis: its name and unit."""
     names = {"amplitude": "PGA (g)", "yield_coefficient": "ky"}
     units = result[dim].attrs.get("units", "1") if dim in result.variables else "1"
@@ -334,7 +336,7 @@ def _yield_coefficient(result: xr.Dataset) -> xr.DataArray | None:
     return found.where(found > 0.0)
 
 
-def _pga(result: xr.Dataset) -> xr.DataArray | None:
+def peak_acceleration_in_g(result: xr.Dataset) -> xr.DataArray | None:
     """Peak ground acceleration in g; of motions that are scaled otherwise their median."""
     g = float(result.attrs["g"])
     if "amplitude" in result.coords:
@@ -353,7 +355,7 @@ def _pgv(result: xr.Dataset) -> xr.DataArray | None:
         time = result["time_scale"] if "time_scale" in result.coords else 1.0
         return _of_motions(result, "motion_pgv", time)
     peak = _PEAK_VELOCITIES.get(str(result.attrs.get("waveform")))
-    pga = _pga(result)
+    pga = peak_acceleration_in_g(result)
     period = _period(result)
     if peak is None or pga is None or period is None:
         return None
@@ -406,7 +408,7 @@ def _above_zero(array: xr.DataArray) -> xr.DataArray:
 
 _FROM_RESULT: Mapping[str, Callable[[xr.Dataset], xr.DataArray | None]] = {
     "yield_coefficient": _yield_coefficient,
-    "pga": _pga,
+    "pga": peak_acceleration_in_g,
     "pgv": _pgv,
     "period": _period,
     "cycles": _cycles,

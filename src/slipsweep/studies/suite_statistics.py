@@ -10,7 +10,6 @@ import xarray as xr
 
 from slipsweep.errors import InputError
 from slipsweep.grid.resources import grid_text
-from slipsweep.model.options import check_one_way
 from slipsweep.model.parameters import check_list, number_text, shown
 from slipsweep.model.variables import (
     STATISTIC_COORDINATES,
@@ -18,6 +17,9 @@ from slipsweep.model.variables import (
     VALUELESS,
     LimitStatus,
     Validity,
+    counted,
+    counted_text,
+    has_signed_displacements,
 )
 from slipsweep.studies.sampling import Thresholds, check_increasing, check_thresholds
 
@@ -73,7 +75,7 @@ def suite_statistics(
           of all displacements, those that are zero, too.
 
         All but the counts and `valueless_share` are of the motions that have a value, NaN where
-        none has.
+        none has.  Of a block that slides both ways they are of |u|.
 
     Raises
     ------
@@ -106,7 +108,6 @@ def suite_statistics(
     for name in ("permanent_displacement", "validity"):
         if name not in result.data_vars:
             raise InputError(f"result: {name}: missing: must be there, of all motions")
-    check_one_way("suite_statistics", result.attrs.get("sliding"))
     dims = suite_dims(result["permanent_displacement"], over)
     g = float(result.attrs.get("g", np.nan))
     limits = check_thresholds("thresholds", thresholds, g)
@@ -116,6 +117,8 @@ def suite_statistics(
         raise InputError(f"zero = {shown(zero)}: must be one displacement")
 
     moved = without_rounding(result["permanent_displacement"].astype(np.float64).load())
+    if has_signed_displacements(result.attrs):
+        moved = abs(moved)
     # a reader may have made codes to numbers with NaN
     codes = result["validity"].fillna(0).astype(np.int16).load()
     there = moved.notnull()
@@ -143,13 +146,16 @@ def suite_statistics(
     }
     attrs = {
         **result.attrs,
-        "title": TITLE,
+        "title": counted_text(TITLE, result.attrs),
         "suite_dimensions": " ".join(dims),
         "zero_displacement": float(least),
     }
     grid = [dim for dim in moved.dims if dim not in dims]
     laid = {name: one.transpose(*grid, ...) for name, one in found.items()}
-    variables = {name: (one.dims, one.values, SUITE_STATISTICS[name]) for name, one in laid.items()}
+    variables = {
+        name: (one.dims, one.values, counted(SUITE_STATISTICS[name], result.attrs))
+        for name, one in laid.items()
+    }
     coords = {
         name: one.variable
         for name, one in result.coords.items()
@@ -244,6 +250,7 @@ def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100)
         found = at_thresholds(found, displacement).transpose(*grid, ...).load()
     else:
         found = suite_statistics(result, thresholds=0.0 if displacement is None else displacement)
+    symbol = "|u|" if has_signed_displacements(result.attrs) else "u"
     varying = [dim for dim, size in grid.items() if size > 1]
     # peak ground accelerations in g
     factors = {"amplitude": 1.0 / float(found.attrs.get("g", np.nan))}
@@ -268,11 +275,14 @@ def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100)
         for d, column in zip(
             found["threshold"].values, rows["exceedance_probability"], strict=True
         ):
-            show(f"P(u > {d * 1000.0:.6g} mm)", column, ".1%")
+            show(f"P({symbol} > {d * 1000.0:.6g} mm)", column, ".1%")
     if (rows["valueless_share"] > 0.0).any():
         show("no value", rows["valueless_share"][0], ".1%")
+    counts = (
+        "permanent displacement" if symbol == "u" else "magnitude of the permanent displacement"
+    )
     return [
-        f"permanent displacement (mm) over {suite}:",
+        f"{counts} (mm) over {suite}:",
         *pd.DataFrame(columns).to_string(index=False).splitlines(),
     ]
 
@@ -301,7 +311,12 @@ def labels_along(data: xr.Dataset, dim: Hashable, factor: float = 1.0) -> list[s
     return [str(one) if values.dtype.kind not in "iuf" else f"{one * factor:.4g}" for one in values]
 
 
-def point_names(data: xr.Dataset, sizes: Mapping[Any, int]) -> list[str]:
-    """What each point of a grid is called, in order: ``theta = 5, mu_s = 0.3``."""
-    along = ([f"{dim} = {label}" for label in labels_along(data, dim)] for dim in sizes)
+def point_names(
+    data: xr.Dataset, sizes: Mapping[Any, int], factors: Mapping[Any, float] | None = None
+) -> list[str]:
+    """Names of the points of a grid: ``theta = 5, mu_s = 0.3``; numbers times `factors`."""
+    along = (
+        [f"{dim} = {label}" for label in labels_along(data, dim, (factors or {}).get(dim, 1.0))]
+        for dim in sizes
+    )
     return [", ".join(parts) for parts in itertools.product(*along)]

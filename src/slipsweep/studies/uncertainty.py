@@ -88,6 +88,7 @@ def sample(
     azimuth: datasets.Values | None = None,
     yield_acceleration: datasets.Values | None = None,
     yield_coefficient: datasets.Values | None = None,
+    upslope_yield_acceleration: datasets.Values | None = None,
     decay_rate: datasets.Values | None = None,
     delta_mu: datasets.Values | None = None,
     minimum_friction: datasets.Values | None = None,
@@ -143,7 +144,7 @@ def sample(
         - `displacement_quantile` (m), dimension `quantile`, `mean_displacement` (m) and `exceedance_probability`,
           dimension `threshold` (m): P(u > threshold).  They are of the samples that have a value;
           NaN where none has. Statically unstable samples have no value, and are counted as
-          exceeding every threshold.
+          exceeding every threshold.  Of a block that slides both ways they are of |u|.
         - `mode_share` (not under a record), dimension `mode`, `flag_share`, dimension `flag`, and `valueless_share`: of
           all samples, how many slide in which mode, have which flag, and have no value.  They do
           not depend on the frequency (of a record: the time scale) and have no such dimension (but
@@ -197,6 +198,7 @@ def sample(
         azimuth=azimuth,
         yield_acceleration=yield_acceleration,
         yield_coefficient=yield_coefficient,
+        upslope_yield_acceleration=upslope_yield_acceleration,
         decay_rate=decay_rate,
         delta_mu=delta_mu,
         minimum_friction=minimum_friction,
@@ -223,8 +225,7 @@ def plan_samples(
 ) -> "SamplePlan":
     """Plan of the samples of a grid, drawn and checked; errors as of `slipsweep.sample`."""
     problem = grid_inputs.check_problem(excitation, model, solver)
-    options.check_one_way("sample", getattr(problem.model, "sliding", None))
-    _check_drawn(sampling, tuple(inputs.given), problem)
+    check_drawn(sampling, tuple(inputs.given), problem)
     drawn = sampling.distributions
     absolute = [name for name, one in drawn.items() if one.kind == "absolute"]
     # 0.5: a value that every parameter may have
@@ -244,11 +245,12 @@ def plan_samples(
     about = options.friction_inputs(
         problem.model.name, coords, {name: one.kind for name, one in drawn.items()}
     )
-    attrs = {**plan.attrs, "title": TITLE, "friction_inputs": about, **sampling.attributes}
+    title = variables.counted_text(TITLE, plan.attrs)
+    attrs = {**plan.attrs, "title": title, "friction_inputs": about, **sampling.attributes}
     return SamplePlan(sampling, problem, coords, attrs)
 
 
-def _check_drawn(sampling: Sampling, given: Sequence[str], problem: grid_inputs.Problem) -> None:
+def check_drawn(sampling: Sampling, given: Sequence[str], problem: grid_inputs.Problem) -> None:
     """Refuse to draw what the model or the shaking does not have, what is given as well, and factors on nothing."""
     if "structure_frequency" in given:
         raise InputError(
@@ -388,7 +390,7 @@ class SamplePlan(plans.Plan):
             results[name] = (
                 dims,
                 np.broadcast_to(zero, [lengths[dim] for dim in dims]),
-                variables.STATISTICS[name],
+                variables.counted(variables.STATISTICS[name], self.attrs),
             )
         return xr.Dataset(results, self.coords | own_coords, self.attrs).drop_dims(self.pooled)
 
@@ -424,6 +426,8 @@ class SamplePlan(plans.Plan):
             *(["sliding_mode"] if "mode_share" in self.names else []),
         )
         solved = engine.solve(engine.Request(self.problem, drawn, inputs, names, progress))
+        if options.slides_both_ways(self.problem.model):
+            solved["permanent_displacement"].values[:] = abs(solved["permanent_displacement"])
         runs = [solved[name].values.reshape(math.prod(sizes.values()), -1) for name in names]
         # of Sobol indices the first runs are the samples
         displacement, flags, *modes = (values[:, : self.samples] for values in runs)

@@ -1,0 +1,40 @@
+"""Blocks that slide both ways, in 30 digits: ``python -m benchmarks.both_ways``.
+
+Solves the cells of tests/support/both_ways.py and all their neighbours one ulp away in multiple
+precision into tests/data/both_ways.csv, and writes both_ways.md.  Nothing is timed.
+"""
+
+from statistics import median
+
+from benchmarks.machine import arguments, number, table
+from tests.support.both_ways import CATEGORIES, Row, cells, row_of, solve_by_package, write_rows
+
+
+def errors_table(rows: list[Row]) -> str:
+    """Return a line a category: its cells, and the errors in units of the conditioning."""
+    lines = []
+    for category in CATEGORIES:
+        own = [row for row in rows if row.category == category.__name__]
+        if own:
+            errors = [row.times_bounds(solve_by_package(row.cell)) for row in own]
+            about = (category.__doc__ or "").rstrip(".")
+            lines.append([about, len(own), number(median(errors), 2), number(max(errors), 2)])
+    return table(["cells", "number", "error, median", "largest"], lines)
+
+
+def main() -> None:
+    """Write the table of cells, and the page."""
+    given = arguments(__doc__)
+    chosen = list(cells())[: 1 if given.tiny else None]
+    rows = [row_of(category, cell) for category, cell in chosen]
+    if not given.tiny:
+        write_rows(rows)
+    about = (
+        "Errors of displacements and peak velocity, in units of what one ulp of an input moves, "
+        "plus half an ulp. Written by `python -m benchmarks.both_ways`."
+    )
+    (given.folder / "both_ways.md").write_text(f"{errors_table(rows)}\n{about}\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
