@@ -49,7 +49,8 @@ def calibrate(
 
     The table's recorded motion shakes the model's block, and what it does is fitted to whatever was
     measured of the real one, each channel weighted by its noise.  The noise of the table's own
-    record enters the intervals.
+    record enters the intervals, and so does the correlation of neighbouring samples of the noise.
+    If several solutions fit, an interval holds them all.  A channel that is cut off is named.
 
     Parameters
     ----------

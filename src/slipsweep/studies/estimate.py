@@ -638,8 +638,9 @@ def _rough_minima(observations: Sequence[Observation], scale: Scale) -> list[Flo
 def _look_along_onset(search: Search) -> None:
     """Follow the minima along Üy.
 
-    Two values of it can give the same velocity, of which one is right.  In continuous sliding Üy and the acceleration at which the block would begin to slide as late by
-    Eq. 4 do so, if the table's acceleration crosses Eq. 4 between the two.
+    Two values of it can give the same velocity, of which one is right.  In continuous sliding Üy
+    and the acceleration at which the block would begin to slide as late by Eq. 4 do so, if the
+    table's acceleration crosses Eq. 4 between the two.
     """
     best = search.best
     fitted = [search.polish(_with(best, [0], onset), free=(1, 2), most=3) for onset in _LOOKS]

@@ -86,7 +86,8 @@ class Line(NamedTuple):
 class Linear:
     """Errors that residuals depend on linearly.
 
-    `effects` are those of one standard deviation of each.  Residuals are in standard deviations, one a row of `effects`.
+    `effects` are those of one standard deviation of each.  Residuals are in standard deviations,
+    one a row of `effects`.
     """
 
     def __init__(self, effects: Floats) -> None:
@@ -122,8 +123,7 @@ class Observation:
 
     `channels` of the block have the noise `sensor_noise` as neighbouring samples, or those at rest,
     scatter, or as given; the fit estimates `noise`, and the correlations `colour` of neighbouring
-    residuals.  `drifts` may drift:
-    those given and `drifting`.  `lines` are offsets, drifts and steps of the block's channels.
+    residuals.  `drifts` may drift: those given and `drifting`.  `lines` are offsets, drifts and steps of the block's channels.
     `table_factor` is how many times the noise of the table's record its errors are.  `upslope` are
     the times at which slips begin that are left out.  `forward` and `linear` are the
     model and the likelihood near the last solution.
@@ -423,7 +423,7 @@ class Observation:
                 self.colour[at] = colour_of(rests[at], effects[at], apart)
 
     def _widen_table_errors(self, parameters: Floats) -> None:
-        """Multiply the errors of the table's motion by what the block's motion shows them to be larger.
+        """Multiply the errors of the table's motion by how much larger the block shows them to be.
 
         They are too small if the noise of the table's record is slower than it seems to be.
         """

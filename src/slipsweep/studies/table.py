@@ -216,10 +216,11 @@ def _colour_at_rest(times: Floats, values: Floats, at_rest: NDArray[np.bool_]) -
 def _colour(times: Floats, values: Floats, kinks: Sequence[_Kink]) -> float:
     """Return the correlation of neighbouring samples of the noise, of largest likelihood.
 
-    It is 0 if that may be chance.  Criteria for the number of knots would follow coloured noise.  So the motion is taken as a
-    process here, a spline whose third derivatives are independent between knots, and the
-    likelihood of the samples, with its coefficients integrated out, is that of mixed linear models
-    (restricted maximum likelihood): its size is sought with the colour and size of the noise.
+    It is 0 if that may be chance.  Criteria for the number of knots would follow coloured noise.
+    So the motion is taken as a process here, a spline whose third derivatives are independent
+    between knots, and the likelihood of the samples, with its coefficients integrated out, is that
+    of mixed linear models (restricted maximum likelihood): its size is sought with the colour and
+    size of the noise.
     """
     part = slice(0, _MOST_SAMPLES)
     times, values = times[part], values[part]
