@@ -123,10 +123,10 @@ class Observation:
 
     `channels` of the block have the noise `sensor_noise` as neighbouring samples, or those at rest,
     scatter, or as given; the fit estimates `noise`, and the correlations `colour` of neighbouring
-    residuals.  `drifts` may drift: those given and `drifting`.  `lines` are offsets, drifts and steps of the block's channels.
-    `table_factor` is how many times the noise of the table's record its errors are.  `upslope` are
-    the times at which slips begin that are left out.  `forward` and `linear` are the
-    model and the likelihood near the last solution.
+    residuals.  `drifts` may drift: those given and `drifting`.  `lines` are offsets, drifts and
+    steps of the block's channels. `table_factor` is how many times the noise of the table's record
+    its errors are.  `upslope` are the times at which slips begin that are left out.  `forward` and
+    `linear` are the model and the likelihood near the last solution.
     """
 
     def __init__(
