@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from slipsweep.errors import InputError
 from slipsweep.model import options, parameters, variables
-from slipsweep.motion.shaking import RESPONSES, TABLE, ShakingTest
+from slipsweep.motion.shaking import TABLE, ShakingTest
 from slipsweep.studies import friction
 from slipsweep.studies.estimate import Estimate, cycle_estimate, estimate
 from slipsweep.studies.friction import Floats
@@ -495,7 +495,7 @@ def _misfit(found: Estimate, with_drift: Callable[[str], Estimate]) -> list[str]
         "the model, a sensor drifts, or its noise is slow: do not use the parameters before you know "
         "why (see the figure)."
     ]
-    for name in RESPONSES:
+    for name in misfits:
         may_drift = all(
             name in one.channels and name not in one.drifts for one in found.observations
         )
