@@ -17,9 +17,11 @@ from benchmarks.machine import ROOT, arguments, measured_on, number, table
 USES: dict[str, list[str]] = {
     "Eqs. 7–11": ["parameters"],
     "a sine": ["sine"],
+    "`slipsweep run` of the design chart": ["chart"],
     "another waveform": ["triangle"],
     "a record": ["record"],
     "a time history": ["history"],
+    "a record, then its time history": ["record", "history of a record"],
     "a record, then a waveform, then a time history": ["record", "triangle", "history"],
     "Newmark's block under a record": ["newmark"],
     "Newmark's block both ways under a record": ["both ways"],
@@ -28,7 +30,7 @@ USES: dict[str, list[str]] = {
 
 #: Is run in a process of its own; prints seconds of the import, of the uses, and counts.
 _PROGRAM = """
-import json, sys, time
+import json, os, sys, tempfile, time
 started = time.process_time()
 import numba, xarray
 imported = time.process_time() - started
@@ -44,12 +46,24 @@ import slipsweep
 record = slipsweep.Record.sampled([0.0, 4.0, -4.0, 0.0], 0.1)
 block = {"theta": 5.0, "mu_s": 0.38, "yield_acceleration": 0.59}
 wave = {"amplitude": 3.55, "frequency": 1.8}
+def run_chart():
+    from slipsweep.cli import main
+    sys.stdout = open(os.devnull, "w")
+    sys.argv = ["slipsweep", "run", "sweeps/design_chart.toml", "-o", tempfile.mktemp(".nc")]
+    try:
+        main()
+    except SystemExit:
+        pass
+    os.remove(sys.argv[-1])
+    sys.stdout = sys.__stdout__
 uses = {
+    "chart": run_chart,
     "parameters": lambda: slipsweep.friction_parameters(5.0, 0.38, 3.55),
     "sine": lambda: slipsweep.sweep(**block, **wave),
     "triangle": lambda: slipsweep.sweep(**block, **wave, excitation="triangle"),
     "record": lambda: slipsweep.sweep(**block, excitation=record),
     "history": lambda: slipsweep.simulate(**block, **wave),
+    "history of a record": lambda: slipsweep.simulate(**block, excitation=record),
     "newmark": lambda: slipsweep.sweep(**block, excitation=record, model="newmark"),
     "both ways": lambda: slipsweep.sweep(
         **block, excitation=record, model=slipsweep.Newmark(sliding="both")

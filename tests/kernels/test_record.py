@@ -561,3 +561,22 @@ def test_dimensions(shaking: Record) -> None:
     one = sweep(5.0, 0.4, scale=1.5, polarity=-1, excitation=shaking, model="newmark")
     picked = result.sel(mu_s=0.4, scale=1.5, time_scale=1.0, polarity=-1, case="b")
     assert float(picked.permanent_displacement) == float(one.permanent_displacement)
+
+
+@pytest.mark.parametrize("sliding", ["downslope", "both"])
+def test_newmark_at_a_sample_that_is_the_yield_acceleration(sliding: Any) -> None:
+    """Üy is a sample, or differs from it in the last bits: the block slides on as if it were not."""
+    rng = np.random.default_rng(3)
+    samples = np.concatenate([[0.0], rng.normal(size=150), [0.0]])
+    record = slipsweep.Record.sampled(samples, 0.02)
+    for sample in np.abs(samples[1:-1]):
+        onsets = sample * (1.0 + np.arange(-4, 5) * 2.0**-52)
+        found = slipsweep.sweep(
+            0.0,
+            0.3,
+            scale=1.0,
+            yield_acceleration=onsets,
+            excitation=record,
+            model=slipsweep.Newmark(sliding=sliding),
+        ).permanent_displacement
+        assert float(np.ptp(found.values)) < 1e-12

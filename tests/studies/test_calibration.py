@@ -9,11 +9,11 @@ import pytest
 import xarray as xr
 
 import slipsweep
-from benchmarks.calibration import drawn, sensed
 from slipsweep import InputError, cli
 from slipsweep.studies.calibration import sweep_file_text
-from slipsweep.studies.estimate import SQUARE, Search
-from tests.support.shaking import CALIBRATED, SOUGHT, coulomb, exact, measured
+from slipsweep.studies.estimate import Search
+from slipsweep.studies.noise import flat_top, noisy_flat_top
+from tests.support.shaking import CALIBRATED, SOUGHT, coulomb, digitised, exact, measured
 
 #: The issue's case: with this motion of 3.2 m/s² Üy holds the block, or Eq. 4 crosses at the same
 #: value.
@@ -37,21 +37,23 @@ def clean() -> dict[str, xr.Dataset]:
     }
 
 
+@pytest.fixture(scope="module")
+def noisy(clean: dict[str, xr.Dataset]) -> dict[str, xr.Dataset]:
+    return {
+        name: calibrated(measured(test, seed=1), name, cycles=True) for name, test in clean.items()
+    }
+
+
 def calibrated(test: Any, mode: str = "stick_slip", **options: Any) -> xr.Dataset:
     case = CALIBRATED[mode]
     return slipsweep.calibrate(test, case["theta"], case["mu_s"], **{"cycles": False, **options})
 
 
-def check_intervals(found: xr.Dataset, case: dict[str, Any], wider: float = 1.8) -> None:
-    """The true values lie within the intervals made wider: for a seed that is written down, no matter of chance."""
+def check_intervals(found: xr.Dataset, case: dict[str, Any]) -> None:
+    """Check that the true values lie within the intervals: the seeds are fixed."""
     for name in SOUGHT:
         low, high = found[f"{name}_interval"].values
-        middle = 0.5 * (low + high)
-        half = 0.5 * (high - low)
-        if np.isfinite(high):
-            assert abs(case[name] - middle) < wider * half, name
-        else:
-            assert case[name] > low, name
+        assert low <= case[name] <= high, name
 
 
 @pytest.mark.parametrize("mode", CALIBRATED)
@@ -62,8 +64,8 @@ def test_without_noise_the_parameters_come_back(clean: dict[str, xr.Dataset], mo
 
 
 @pytest.mark.parametrize("mode", CALIBRATED)
-def test_noise_digitisation_and_cycles(clean: dict[str, xr.Dataset], mode: str) -> None:
-    found = calibrated(measured(clean[mode], seed=1), mode, cycles=True)
+def test_noise_digitisation_and_cycles(noisy: dict[str, xr.Dataset], mode: str) -> None:
+    found = noisy[mode]
     case = CALIBRATED[mode]
     check_intervals(found, case)
     for name in ("block_acceleration", "relative_velocity", "relative_displacement"):
@@ -73,7 +75,7 @@ def test_noise_digitisation_and_cycles(clean: dict[str, xr.Dataset], mode: str) 
     assert found.sizes["cycle"] == case["excitation"].cycles
     for name in SOUGHT[1:]:
         off = (found[f"cycle_{name}"] - case[name]) / found[f"cycle_{name}_error"]
-        assert np.abs(off).max() < 4.5, name
+        assert 0.5 < np.abs(off).max() < 3.5, name
     if mode == "stick_slip":
         top = (
             found.computed_block_acceleration.where(found.computed_relative_velocity > 0)
@@ -85,30 +87,14 @@ def test_noise_digitisation_and_cycles(clean: dict[str, xr.Dataset], mode: str) 
         assert np.isnan(found.cycle_yield_acceleration).all()
 
 
-@pytest.mark.parametrize("kind", ["eq4", "yield", "continuous"])
-def test_intervals_hold_the_true_parameters(kind: str) -> None:
-    """Of 3 x 4 intervals at 95 % three or more miss in 2 % of all such draws; these seeds are fixed."""
-    missed = 0
-    for seed in range(4):
-        case, test = drawn(kind, seed)
-        found = slipsweep.calibrate(
-            sensed(test, ("white", "12 bits")[seed % 2], seed),
-            case["theta"],
-            case["mu_s"],
-            cycles=False,
-        )
-        for name in SOUGHT:
-            low, high = found[f"{name}_interval"].values
-            missed += not low <= case[name] <= high
-    assert missed <= 2
-
-
 def test_two_branches_are_united_and_a_second_test_tells_them_apart() -> None:
     weak = measured(exact(BRANCHES), seed=0, noise=0.01)
     found = slipsweep.calibrate(weak, 5.0, 0.38, cycles=False)
-    check_intervals(found, BRANCHES, 1.0)
+    check_intervals(found, BRANCHES)
     first, second, third, *_ = found.attrs["findings"].splitlines()
-    assert first.startswith("Üy, λ and Δμ are not determined by this test: Üy up to 1.3 m/s2; λ 2.")
+    assert first.startswith(
+        "Üy, λ and Δμ are not determined by this test: 95 % intervals Üy up to 1.3 "
+    )
     assert second.startswith("Two readings fit equally well: Üy holds the block")
     assert third.startswith("Test at another amplitude and give calibrate all tests together: at ")
     assert np.isnan(found.yield_acceleration_error)
@@ -123,7 +109,7 @@ def test_two_branches_are_united_and_a_second_test_tells_them_apart() -> None:
     # search
     strong = measured(exact({**BRANCHES, "amplitude": 5.0}), seed=2, noise=0.005)
     both = slipsweep.calibrate([weak, strong], 5.0, 0.38, cycles=False)
-    check_intervals(both, BRANCHES, 1.0)
+    check_intervals(both, BRANCHES)
     assert both.sizes["test"] == 2
     assert both.yield_acceleration_error.item() < 0.01
     assert both.decay_rate_interval.values[1] < 6.0
@@ -148,13 +134,107 @@ def test_a_branch_is_compared_with_its_own_least() -> None:
     for start in (0.41, 0.79):
         search.polish(np.array([start, 0.9, 0.1]))
     low, high = (search.end(0, side, 0.02) for side in (-1, 1))
-    assert low == pytest.approx(0.4 - 0.01 * SQUARE**0.5, abs=1e-3)
-    assert high == pytest.approx(0.8 + 0.01 * SQUARE**0.5, abs=1e-3)
+    assert low == pytest.approx(0.4 - 0.0196, abs=3e-4)
+    assert high == pytest.approx(0.8 + 0.0196, abs=3e-4)
+
+
+def test_several_minima_that_fit_are_several_solutions() -> None:
+    """Two values of one parameter fit equally well, and none between them."""
+
+    def residuals(point: np.ndarray) -> np.ndarray:
+        return np.array([(point[0] - 0.2) * (point[0] - 0.6) / 0.001, point[1] - 1.0, point[2]])
+
+    search = Search(residuals, lambda point: ("all",))
+    for onset in (0.19, 0.61):
+        search.follow(np.array([onset, 0.9, 0.1]))
+    assert search.apart() == pytest.approx([0.2, 0.6], abs=1e-3)
+    for at, (low, high) in enumerate(search.intervals(np.full(3, 0.01))[:1]):
+        assert low < 0.2 < 0.6 < high, at
+
+
+def test_a_second_minimum_of_an_exact_test_is_not_the_answer() -> None:
+    """With Üy 1.010 m/s2 the block would have gained the same velocity up to the onset."""
+    case: dict[str, Any] = {
+        "theta": 3.8,
+        "mu_s": 0.2268,
+        "amplitude": 5.589,
+        "frequency": 4.518,
+        "yield_acceleration": 1.934,
+        "decay_rate": 2.94,
+        "delta_mu": 0.124,
+        "excitation": slipsweep.Sine(cycles=5),
+    }
+    test = slipsweep.simulate(**case, times=np.arange(0.0, 5.0 / 4.518, 1.0 / 150.0))
+    found = slipsweep.calibrate(test, 3.8, 0.2268, cycles=False)
+    check_intervals(found, case)
+    assert np.diff(found.yield_acceleration_interval) < 0.02
+    assert found.attrs["findings"] == ""
+
+
+def test_samples_that_contradict_the_solution_are_named(clean: dict[str, xr.Dataset]) -> None:
+    test = measured(clean["stick_slip"], seed=1, noise=0.005)
+    # while the block follows Eq. 4
+    fastest = int(np.argmax(test.ground_acceleration.values))
+    test.block_acceleration.values[fastest - 3 : fastest + 3] += 0.3
+    found = calibrated(test)
+    *_, finding = found.attrs["findings"].splitlines()
+    assert re.match(r"6 samples of block_acceleration cannot be noise: up to 0\.[234]", finding)
+    assert f"first at {test.time.values[fastest - 3]:.4g} s" in finding
+    assert found.attrs["model_table"].startswith("# WARNING: not ready for use.")
+
+
+def test_offsets_in_all_channels_are_fitted(clean: dict[str, xr.Dataset]) -> None:
+    """Offsets of 3 % of each channel's peak, of either sign."""
+    test = measured(clean["stick_slip"], seed=3, noise=0.005, bits=None)
+    sizes = {}
+    for sign, name in zip((1.0, -1.0, 1.0, -1.0), test.data_vars, strict=True):
+        sizes[name] = sign * 0.03 * float(np.abs(test[name]).max())
+        test[name].values[:] += sizes[name]
+    found = calibrated(test, offset="all")
+    check_intervals(found, CALIBRATED["stick_slip"])
+    assert found.yield_acceleration_error.item() < 0.1
+    assert found.attrs["findings"] == ""
+    for name, true in sizes.items():
+        (said,) = re.findall(
+            rf"offset of {name}: (-?[\d.e-]+) ± ([\d.e-]+)", found.attrs["removed"]
+        )
+        assert abs(float(said[0]) - true) < 3.0 * float(said[1]), name
+        assert float(said[1]) < 0.2 * abs(true), name
+
+
+def test_a_table_channel_that_is_cut_off_is_named(clean: dict[str, xr.Dataset]) -> None:
+    test = measured(clean["stick_slip"], 5, 0.01, responses=["block_acceleration"])
+    table = test.ground_acceleration.values
+    table[:] = np.minimum(table, 4.8)
+    found = calibrated(test)
+    first, second, *_ = found.attrs["findings"].splitlines()
+    assert first.startswith("ground_acceleration is cut off: it is flat at 4.8 m s-2, ")
+    assert second == "The intervals do not include what is cut off. Test with a larger range."
+    assert found.attrs["model_table"].startswith("# WARNING: not ready for use.\n# ground_acc")
+    assert found.attrs["uncertainty_table"] == ""
+
+
+@pytest.mark.parametrize("bits", [None, 8, 12])
+@pytest.mark.parametrize("noise", [0.0, 0.002, 0.01])
+def test_a_crest_is_told_from_a_flat_top(noise: float, bits: int | None) -> None:
+    random = np.random.default_rng(2)
+    wave = np.sin(2.0 * np.pi * 2.0 * np.arange(0.0, 3.0, 1.0 / 200.0))
+    errors = noise * random.standard_normal(wave.size)
+
+    def sampled(values: np.ndarray) -> np.ndarray:
+        return values if bits is None else digitised(values, bits, 1.25)
+
+    assert not flat_top(sampled(wave + errors))
+    assert not noisy_flat_top(sampled(wave + errors))
+    assert flat_top(sampled(np.minimum(wave + errors, 0.9))) > 40
+    under_noise = sampled(np.minimum(wave, 0.9) + errors)
+    assert max(flat_top(under_noise), noisy_flat_top(under_noise)) > 40
 
 
 @pytest.mark.parametrize("kinetic", [0.38, 0.25])
 def test_coulombs_block_is_newmarks(kinetic: float) -> None:
-    found = slipsweep.calibrate(coulomb(kinetic), 6.0, 0.38, cycles=False)
+    test = coulomb(kinetic).isel(time=slice(None, None, 2))
+    found = slipsweep.calibrate(test, 6.0, 0.38, cycles=False)
     first = found.attrs["findings"].splitlines()[0]
     assert first.startswith("This is a block of constant friction: by statics ")
     assert first == found.attrs["constant_friction"]
@@ -189,7 +269,8 @@ def test_displacement_alone_does_not_tell_decay_from_excess(clean: dict[str, xr.
 
 
 def test_sensors_at_fault(clean: dict[str, xr.Dataset]) -> None:
-    test = measured(clean["stick_slip"].isel(time=slice(None, None, 2)), seed=4)
+    responses = ["block_acceleration", "relative_displacement"]
+    test = measured(clean["stick_slip"].isel(time=slice(None, None, 2)), 4, responses=responses)
     test.relative_displacement.values[:] += 0.01 + 0.2 * test.time.values
     found = calibrated(test)
     first, second, *_ = found.attrs["findings"].splitlines()
@@ -205,15 +286,14 @@ def test_sensors_at_fault(clean: dict[str, xr.Dataset]) -> None:
     )
     test.ground_acceleration.values[:] += 0.2
     drift = 0.2 * float(np.ptp(test.time.values))
-    for drifts in ("relative_displacement", "all"):
-        asked = calibrated(test, drift=drifts, offset="ground_acceleration")
-        check_intervals(asked, CALIBRATED["stick_slip"])
-        for name, true in (
-            ("drift of relative_displacement", drift),
-            ("offset of ground_acceleration", 0.2),
-        ):
-            (said,) = re.findall(rf"{name}: ([\d.]+) ± ([\d.]+)", asked.attrs["removed"])
-            assert abs(float(said[0]) - true) < min(3.5 * float(said[1]), 0.1 * true), name
+    asked = calibrated(test, drift="relative_displacement", offset="all")
+    check_intervals(asked, CALIBRATED["stick_slip"])
+    for name, true in (
+        ("drift of relative_displacement", drift),
+        ("offset of ground_acceleration", 0.2),
+    ):
+        (said,) = re.findall(rf"{name}: ([\d.]+) ± ([\d.]+)", asked.attrs["removed"])
+        assert abs(float(said[0]) - true) < min(3.0 * float(said[1]), 0.1 * true), name
 
 
 def test_unequal_sampling_gaps_and_an_early_end(clean: dict[str, xr.Dataset]) -> None:
@@ -240,13 +320,13 @@ def test_a_block_that_slips_upslope(clean: dict[str, xr.Dataset]) -> None:
 
 
 def test_a_record_that_begins_in_motion_is_named(clean: dict[str, xr.Dataset]) -> None:
-    test = measured(clean["stick_slip"], seed=15)
+    test = measured(clean["stick_slip"], seed=15, responses=["block_acceleration"])
     late = calibrated(test.isel(time=slice(int(np.argmax(test.time.values > 1.12)), None, 2)))
     assert "The table moves as the record begins, at " in late.attrs["findings"]
 
 
-def test_the_tables_to_paste_run(clean: dict[str, xr.Dataset], tmp_path: Path) -> None:
-    found = calibrated(measured(clean["stick_slip"], seed=11))
+def test_the_tables_to_paste_run(noisy: dict[str, xr.Dataset], tmp_path: Path) -> None:
+    found = noisy["stick_slip"]
     given = {"theta": 5, "mu_s": 0.38, "amplitude": 3, "frequency": 2}
     axes = "".join(f"\n[axes.{name}]\nvalues = [{value}]\n" for name, value in given.items())
     path = tmp_path / "pasted.toml"

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy.signal import lfilter
 
 import slipsweep
 from slipsweep.motion.shaking import CHANNELS, RESPONSES
@@ -99,6 +100,13 @@ def measured(
         noisy = values + noise * peak * generator.standard_normal(values.size)
         test[name].values[:] = noisy if bits is None else digitised(noisy, bits, 1.25 * peak)
     return test.drop_vars([name for name in RESPONSES if name not in responses])
+
+
+def coloured(samples: int, correlation: float, seed: int = 0) -> np.ndarray:
+    """Noise of first order and unit variance: neighbouring samples have this correlation."""
+    white = np.random.default_rng(seed).standard_normal(samples + 300)
+    noise = lfilter([np.sqrt(1.0 - correlation**2)], [1.0, -correlation], white)
+    return np.asarray(noise[300:])
 
 
 def coulomb(kinetic: float, noise: float = 0.01, seed: int = 0) -> xr.Dataset:

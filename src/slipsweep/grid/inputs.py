@@ -32,6 +32,8 @@ class Problem:
     model: Model
     excitation: Waveform | Record | Suite
     solver: Solver
+    #: Cells under a sine are walked like those under any wave, and not put into batches.
+    walked: bool = False
 
 
 def check_problem(excitation: Any, model: Any, solver: Any) -> Problem:

@@ -161,9 +161,13 @@ def plan_sweep(
     model: Any = "mendez",
     solver: Any = "auto",
     variables: Any = None,
+    walked: bool = False,
 ) -> Plan:
-    """Plan of a sweep; arguments and errors (InputError) are those of `slipsweep.sweep`."""
-    problem = grid_inputs.check_problem(excitation, model, solver)
+    """Plan of a sweep; arguments and errors (InputError) are those of `slipsweep.sweep`.
+
+    Cells under a sine may be `walked`, as those under any wave, and not put into batches.
+    """
+    problem = replace(grid_inputs.check_problem(excitation, model, solver), walked=walked)
     coords = grid_inputs.check_parameters(problem, inputs)
     is_wave = isinstance(problem.excitation, Waveform)
     results = known.RESULTS if is_wave else known.RECORD_RESULTS

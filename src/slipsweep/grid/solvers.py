@@ -111,7 +111,8 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
             lambda cells, results: solve_walk(cells, options, path, *workspace_of(), results), ROWS
         )
     assert isinstance(motion, Waveform)
-    return Solver(under_sine if is_plain_sine(motion) else under_wave, ROWS)
+    in_batches = is_plain_sine(motion) and not problem.walked
+    return Solver(under_sine if in_batches else under_wave, ROWS)
 
 
 def newmark_solver(problem: Problem, options: physics.Options, polarity: float) -> Solver:
@@ -138,7 +139,8 @@ def newmark_solver(problem: Problem, options: physics.Options, polarity: float) 
         results[:, left] = solved[: results.shape[0]]
 
     # a batch solves several cells at once, the kernel one by one
-    if is_plain_sine(motion) and not slides_both_ways(problem.model):
+    in_batches = is_plain_sine(motion) and not problem.walked
+    if in_batches and not slides_both_ways(problem.model):
         return Solver(solve_in_batches, ROWS)
     return Solver(solve, NEWMARK_ROWS, newmark.NEWMARK_CELL)
 

@@ -97,7 +97,10 @@ def held_gains(
         gained = (rate + 0.5 * slope * width) * width
         return gained, (0.5 * rate + slope * width / 6.0) * width * width
     # ∫ (w − top) dτ and ∫ (end − τ)(w − top) dτ
-    if piece.arc:
+    if start == piece.begin and end == piece.finish:
+        first = curve.whole_once
+        second = curve.whole_twice
+    elif piece.arc:
         before = angle_minus_sine(start)
         whole = half_square_minus_versine(end) - half_square_minus_versine(start)
         first = -piece.top * (angle_minus_sine(end) - before)

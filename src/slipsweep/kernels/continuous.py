@@ -91,7 +91,8 @@ def follow_eq4(
     below = 0.0
     drift = 0.0
     velocity = 0.0
-    for p in range(start.piece, min(until.piece + 1, base.pieces.size)):
+    last = until.piece + 1 if until.piece < base.pieces.size else until.piece
+    for p in range(start.piece, last):
         piece = base.pieces[p]
         curve = base.curves[piece.curve]
         begin = start.tau if p == start.piece else piece.begin
@@ -129,7 +130,7 @@ def half_wave_after(path: Path, k: int) -> int:
     return p
 
 
-@single
+@scalar
 def continuous_pulse(
     block: Block,
     path: Path,

@@ -211,7 +211,10 @@ def panel_lag(
     amplitude = block.amplitude
     width = until - near
     top = piece.top
-    if piece.arc:
+    if abs(width) == piece.finish - piece.begin:
+        for node in range(NODE_COUNT):
+            x[node] = amplitude * curve.nodes[node]
+    elif piece.arc:
         for node in range(NODE_COUNT):
             x[node] = amplitude * (1.0 - versine(near + width * NODES[node]))
     else:

@@ -4,7 +4,6 @@ The parts of the motion in the log are those that a sweep goes through, and each
 from the functions that integrate it there: a history ends at the displacement that the sweep gives.
 """
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,14 +11,14 @@ from numpy.typing import NDArray
 
 from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import scalar
-from slipsweep.kernels.base import base_acceleration, held_gains
+from slipsweep.kernels.base import held_gains
 from slipsweep.kernels.block import Cell, Motion, Options, interface_of
 from slipsweep.kernels.eq4 import Block, block_of, eq4_gains, response
 from slipsweep.kernels.grid import CELL
 from slipsweep.kernels.slide import ATTENUATES, HELD, SLIDES_ON, Slide
 from slipsweep.kernels.walk import solve_walk, workspace_of
 from slipsweep.model import equations as eq
-from slipsweep.motion.paths import Path
+from slipsweep.motion.paths import Path, values_at
 
 #: Rows of the first log that is tried; one of which a single pulse has more is made twice as long.
 _ROWS = 1024
@@ -45,7 +44,7 @@ def fill_history(
     cells = np.array([tuple(cell)], CELL)
     results = np.empty((len(Motion._fields), 1))
     walks, slides, log = workspace_of(_ROWS)
-    fill_base(cell.amplitude, options.cycles, path, phases, history.ground_acceleration)
+    history.ground_acceleration[:] = cell.amplitude * values_at(path, phases)
     sampled = 0
     while True:
         solve_walk(cells, options, path, walks, slides, log, results)
@@ -59,37 +58,6 @@ def fill_history(
         )
         if walk.ended or sampled == phases.size:
             break
-
-
-@scalar
-def cycle_of_path(path: Path, n: int) -> int:
-    """Return the cycle of the path that is cycle n of the shaking."""
-    if n < path.lead:
-        return n
-    return path.lead if n < path.lead + path.repeats else n - max(path.repeats - 1, 0)
-
-
-@kernel
-def fill_base(
-    amplitude: float, cycles: int, path: Path, phases: np.ndarray, ground: np.ndarray
-) -> None:
-    """Fill the base's acceleration at increasing phases; at a jump, the value after it."""
-    pieces = path.base.pieces
-    p = 0
-    end = pieces[pieces.size - 1].end + 2.0 * math.pi * max(path.repeats - 1, 0)
-    for at in range(phases.size):
-        ground[at] = 0.0
-        if pieces[0].start <= phases[at] < end:
-            n = min(max(int(phases[at] / (2.0 * math.pi)), 0), cycles - 1)
-            c = cycle_of_path(path, n)
-            phi = phases[at] - 2.0 * math.pi * (n - c)
-            if not path.cycles[c].first <= p < path.cycles[c + 1].first or phi < pieces[p].start:
-                p = path.cycles[c].first
-            while p + 1 < path.cycles[c + 1].first and pieces[p].end <= phi:
-                p += 1
-            piece = pieces[p]
-            tau = min(max(piece.begin + (phi - piece.start), piece.begin), piece.finish)
-            ground[at] = base_acceleration(piece, path.base.curves[piece.curve], amplitude, tau)
 
 
 @scalar

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import scalar
-from slipsweep.kernels.history import History, cycle_of_path
+from slipsweep.kernels.history import History
 from slipsweep.kernels.newmark import (
     BLOCK,
     Block,
@@ -37,6 +37,14 @@ def fill_newmark_history(
     """
     history.ground_acceleration[:] = cells["amplitude"][0] * values_at(path, phases)
     sample_newmark(cells, g, cycles, path, phases, np.zeros(1, BLOCK), history)
+
+
+@scalar
+def cycle_of_path(path: Path, n: int) -> int:
+    """Return the cycle of the path that is cycle n of the shaking."""
+    if n < path.lead:
+        return n
+    return path.lead if n < path.lead + path.repeats else n - max(path.repeats - 1, 0)
 
 
 @scalar

@@ -30,11 +30,12 @@ from slipsweep.motion.samples import SPAN, Samples
 
 @scalar
 def onset_on_line(
-    block: Block, samples: Samples, i: int, left: float
+    block: Block, samples: Samples, i: int, left: float, stays: bool
 ) -> tuple[float, float, float]:
     """Return where on line i a block at rest begins to slide, which way, and the rate there.
 
-    The side is 0 where it does not.
+    The side is 0 where it does not.  A block `stays` if it slid from here and stopped at once: Üg
+    is beyond yield by rounding only.
     """
     first = block.amplitude * samples.acceleration[i]
     last = block.amplitude * samples.acceleration[i + 1]
@@ -43,10 +44,10 @@ def onset_on_line(
     if left < spacing:
         ground = last - (last - first) / spacing * left
     downslope = ground - block.yield_acceleration
-    if downslope > 0.0:
+    if downslope > 0.0 and not stays:
         return left, 1.0, downslope
     upslope = -ground - block.upslope_yield_acceleration
-    if upslope > 0.0:
+    if upslope > 0.0 and not stays:
         return left, -1.0, upslope
     side = 1.0 if last > 0.0 else -1.0
     limit = block.yield_acceleration if side > 0.0 else block.upslope_yield_acceleration
@@ -192,14 +193,19 @@ def walk(block: Block, samples: Samples) -> None:
     lines = samples.acceleration.size - 1
     i = 0
     left = samples.spacing[0]
+    stays = False
     while i < lines:
-        left, side, rate = onset_on_line(block, samples, i, left)
+        left, side, rate = onset_on_line(block, samples, i, left, stays)
+        stays = False
         if side == 0.0:
             i = next_line_beyond(block, samples, i + 1)
             left = samples.spacing[i]
         else:
             block.slips += 1.0
-            i, left = slide(block, samples, i, left, side, rate)
+            stop, left_there = slide(block, samples, i, left, side, rate)
+            stays = stop == i and left_there == left
+            i = stop
+            left = left_there
 
 
 @scalar

@@ -32,6 +32,8 @@ SLIDE = np.dtype(
                 ("kind", np.int64),
                 ("held", np.float64),
                 ("slides", np.bool_),
+                # if the largest V is requested
+                ("wants_peak", np.bool_),
                 # slides that began from rest
                 ("slips", np.float64),
                 # for the log: how many rows it has; the phase at the beginning of the pulse, and V

@@ -214,7 +214,8 @@ def hold(
         # nothing slows it: over a part so short that its gain is rounding, it does not stop
         stops = False
         gained = max(gained, 0.0)
-    if opposite(rate, rate_end) and (rate > 0.0 or velocity > 0.0):
+    turns = opposite(rate, rate_end) and (rate > 0.0 or velocity > 0.0)
+    if turns and (rate < 0.0 or stops or slide.wants_peak):
         # V turns where Üg = b; one that starts from rest there only seems to fall, by rounding
         turn = offset_at(piece, curve, amplitude, held)
         extreme = velocity + held_gains(piece, curve, amplitude, held, start, turn)[0]
@@ -383,7 +384,7 @@ def attenuate(
     gain(slide, side * eq.attenuated_velocity(speed, held, duration), side * moved)
 
 
-@single
+@scalar
 def recouple(
     block: Block,
     recoupling: int,
@@ -392,17 +393,23 @@ def recouple(
     following: Place,
     slide: Slide,
     log: np.ndarray,
-) -> None:
-    """Go from Üg = 0, at piece `t5`, to the next pulse or to the stop: option `recoupling`.
+) -> int:
+    """Go from Üg = 0, at piece `t5`, to the next pulse or to the stop; return flags.
 
-    By Eq. 12 with Ümax = b, or with b held on until the shaking ends.  The `following` place lies
-    past the last piece if there is no next pulse.
+    Option `recoupling`: by Eq. 12 with Ümax = b, or with b held on until the shaking ends, and then
+    Eq. 12.  A block that slides with b ≤ 0 does not come to rest, and has no value.  The
+    `following` place lies past the last piece if there is no next pulse.
     """
+    if not slide.slides:
+        return 0
+    if slide.held <= 0.0:
+        slide.displacement = math.nan
+        return KD_NOT_POSITIVE
     count = base.pieces.size
     started = base.pieces[t5].start if t5 < count else base.pieces[count - 1].end
     ends = following.piece >= count
     if recoupling == INTEGRATE:
-        for p in range(t5, min(following.piece + 1, count)):
+        for p in range(t5, count if ends else following.piece + 1):
             piece = base.pieces[p]
             end = following.tau if p == following.piece else piece.finish
             if slide.slides and end > piece.begin:
@@ -410,11 +417,12 @@ def recouple(
                 hold(block, piece, curve, piece.begin, end, slide, log)
         started = base.pieces[count - 1].end
     if not slide.slides or (recoupling == INTEGRATE and not ends):
-        return
+        return 0
     duration = math.inf
     if not ends:
         duration = phase_at(base.pieces[following.piece], following.tau) - started
     attenuate(slide.held, base.pieces[0], started, duration, slide, log)
+    return 0
 
 
 @scalar
@@ -445,7 +453,7 @@ def beginning(block: Block, path: Path, k: int) -> Place:
     return Place(p, offset_at(piece, path.base.curves[piece.curve], block.amplitude, onset_))
 
 
-@single
+@scalar
 def stick_slip_pulse(
     block: Block,
     recoupling: int,
@@ -485,13 +493,7 @@ def stick_slip_pulse(
         if p < t5:
             x = block.amplitude * base.pieces[p].first
             tau = base.pieces[p].begin
-    if not slide.slides:
-        return 0
-    if slide.held <= 0.0:  # by Eq. 12 the block does not come to rest
-        slide.displacement = math.nan
-        return KD_NOT_POSITIVE
-    recouple(block, recoupling, base, t5, following, slide, log)
-    return 0
+    return recouple(block, recoupling, base, t5, following, slide, log)
 
 
 @inlined

@@ -155,7 +155,8 @@ def flags_of_pulse(
 @inlined
 def cycles_before(path: Path, walk: Walk) -> int:
     """Return how many cycles more have passed than the path has, which has the plain cycle once."""
-    return max(min(path.repeats - walk.left, path.repeats - 1), 0)
+    passed = path.repeats - walk.left
+    return passed - 1 if 0 < passed == path.repeats else passed
 
 
 @scalar
@@ -211,19 +212,20 @@ def pass_over_cycles(options: Options, path: Path, walk: Walk) -> None:
     walk.done += 1
     gained = walk.velocity - walk.entered
     if walk.entered == 0.0 and walk.velocity == 0.0:
-        # all cycles; and the last one, which Eq. 12 ends in the same way though no pulse follows
-        alone = path.cycles.size == path.lead + 3 and (
-            path.cycles[path.lead + 1].shape == path.cycles[path.lead].shape
-        )
-        last = 1 if alone and options.recoupling == EQ12 else 0
-        add(walk, (walk.left + last) * walk.gained)
+        # all cycles; the last one, too, which Eq. 12 ends in the same way though no pulse follows
+        last = path.last_alike and options.recoupling == EQ12
+        add(walk, (walk.left + path.alike + (1 if last else 0)) * walk.gained)
         walk.left = 0
-        walk.interval = path.intervals.size if last else walk.interval
+        until = path.cycles[path.lead + 1 + path.alike].first
+        while walk.interval < path.intervals.size and (
+            last or path.intervals[walk.interval].first < until
+        ):
+            walk.interval += 1
     elif walk.least > 0.0:
         # the block never rests: V changes by the same amount each time
         alike = float(walk.left)
         if gained < 0.0:
-            alike = min(alike, math.floor(walk.least / -gained))
+            alike = min(alike, float(math.floor(walk.least / -gained)))
         add(walk, alike * walk.gained + math.pi * gained * alike * (alike + 1.0))
         walk.velocity += alike * gained
         walk.left -= int(alike)
@@ -265,7 +267,7 @@ def walk_pulses(
     friction of its own peak, and may be one of continuous sliding.
     """
     plain = path.cycles[path.lead].first
-    plain_end = path.cycles[path.lead + 1].first
+    plain_end = path.cycles[path.lead + 1].first if path.repeats > 0 else plain
     continuous = False
     if walk.interval < 0:
         walk.interval = first_pulse(block, path, walk.interval + 1)
@@ -317,6 +319,7 @@ def walk_pulses(
             walk.left -= 1
             if log.size == 0:
                 pass_over_cycles(options, path, walk)
+                walk.interval = first_pulse(block, path, walk.interval)
             if walk.left > 0:
                 walk.interval = walk.first
     walk.ended = True
@@ -392,12 +395,10 @@ def yield_governs(block: Block, path: Path) -> bool:
     """
     if block.rise != MONOTONE:
         return False
-    for p in range(path.base.pieces.size):
-        piece = path.base.pieces[p]
-        low = max(block.amplitude * piece.first, block.yield_acceleration)
-        high = block.amplitude * piece.top
-        rises = piece.last >= piece.first or piece.jumps
-        if rises and high > block.yield_acceleration and not stays_below_yield(block, low, high):
+    for i in range(path.rises.shape[0]):
+        low = max(block.amplitude * path.rises[i, 0], block.yield_acceleration)
+        high = block.amplitude * path.rises[i, 1]
+        if high > block.yield_acceleration and not stays_below_yield(block, low, high):
             return False
     return True
 
@@ -488,6 +489,7 @@ def solve_walk(
             begin(walk, path)
             walk.validity = validity_before(cell, block, interface, options, path)
         slide.logged = 0
+        slide.wants_peak = options.wants_peak
         if walk.validity & NO_VALUE or highest <= block.yield_acceleration:
             walk.ended = True
         elif series:

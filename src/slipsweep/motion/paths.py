@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from slipsweep.motion.pieces import Wave
+from slipsweep.motion.pieces import NODES, Wave
 
 #: Terms of the Taylor series of a smooth piece about its anchor: the first one beyond is 1.3e-18
 #: (docs/numerics.md#pieces-of-a-wave).
@@ -57,6 +57,11 @@ CURVE = np.dtype(
             # of the first and second integral from the anchor, of τ² and τ³ on
             ("once", np.float64, (TERMS,)),
             ("twice", np.float64, (TERMS,)),
+            # of the whole piece: |w| at the nodes of a quadrature from its lower end on, and
+            # ∫ (w − top) dτ and ∫ (finish − τ)(w − top) dτ
+            ("nodes", np.float64, (NODES.size,)),
+            ("whole_once", np.float64),
+            ("whole_twice", np.float64),
         ],
     )
 )
@@ -84,10 +89,13 @@ class Path(NamedTuple):
     base: Base
     intervals: np.ndarray  # of INTERVAL
     cycles: np.ndarray  # of CYCLE; the last one begins where the path ends
+    rises: np.ndarray  # (ranges, 2) all w > 0 that the base rises through, or jumps to
     highest: float  # w
     lowest: float
     lead: int
     repeats: int
+    alike: int  # cycles after the plain one that are as it is, and followed by another such one
+    last_alike: bool  # the last cycle is as those, but that none follows
     recorded: bool  # time stands in place of the phase, and each pulse has its own friction
 
 
@@ -105,10 +113,16 @@ def path_of(wave: Wave, recorded: bool) -> Path:
     curves = np.zeros(max(curved.size, 1), CURVE)
     for name in ("coefficients", "once", "twice") if curved.size else ():
         curves[name] = wave.pieces[name][curved]
+    _fill_whole(curves, wave.pieces[curved])
     intervals = np.zeros(wave.height.size, INTERVAL)
     intervals["first"] = wave.interval[:, 0]
     intervals["end"] = wave.interval[:, 1]
     intervals["height"] = wave.height
+    after = wave.shape[wave.lead :]
+    alike = 0
+    while alike + 2 < after.size and after[alike + 1] == after[alike + 2] == after[0]:
+        alike += 1
+    last_alike = after.size == alike + 2 and after[alike + 1] == after[0]
     cycles = np.zeros(wave.cycle.size, CYCLE)
     cycles["first"] = wave.cycle
     cycles["shape"][:-1] = wave.shape
@@ -116,12 +130,51 @@ def path_of(wave: Wave, recorded: bool) -> Path:
         base=Base(pieces, curves),
         intervals=intervals,
         cycles=cycles,
+        rises=_rises(wave.pieces),
         highest=wave.highest,
         lowest=wave.lowest,
         lead=wave.lead,
         repeats=wave.repeats,
+        alike=alike,
+        # an interval that runs over is cut off by the end of the shaking
+        last_alike=bool(last_alike and wave.pieces["last"][-1] <= 0.0),
         recorded=recorded,
     )
+
+
+def _fill_whole(curves: np.ndarray, pieces: np.ndarray) -> None:
+    """Fill what is said of whole curved pieces."""
+    for curve, piece in zip(curves, pieces, strict=False):
+        powers = np.arange(1, TERMS + 1)
+        begin = piece["begin"]
+        finish = piece["finish"]
+        lower, upper = (
+            (begin, finish) if abs(piece["first"]) <= abs(piece["last"]) else (finish, begin)
+        )
+        tau = lower + (upper - lower) * NODES
+        curve["nodes"] = np.abs(piece["top"] + tau[:, np.newaxis] ** powers @ curve["coefficients"])
+        # one of the two ends is the anchor, where all these are 0
+        curve["whole_once"] = curve["once"] @ (finish ** (powers + 1) - begin ** (powers + 1))
+        moment = curve["twice"] @ (finish ** (powers + 2) - begin ** (powers + 2))
+        before = curve["once"] @ begin ** (powers + 1)
+        curve["whole_twice"] = moment - before * (finish - begin)
+
+
+def _rises(pieces: np.ndarray) -> np.ndarray:
+    """Return the ranges of w > 0 that the base rises through, each as large as possible."""
+    rising = (pieces["top"] > 0.0) & ((pieces["last"] >= pieces["first"]) | pieces["jumps"])
+    ranges: list[list[float]] = []
+    lows = np.where(
+        pieces["jumps"] & (pieces["last"] < pieces["first"]), pieces["top"], pieces["first"]
+    )
+    for low, high in sorted(
+        {*zip(lows[rising].tolist(), pieces["top"][rising].tolist(), strict=True)}
+    ):
+        if ranges and low <= ranges[-1][1]:
+            ranges[-1][1] = max(ranges[-1][1], high)
+        else:
+            ranges.append([low, high])
+    return np.array(ranges, np.float64).reshape(-1, 2)
 
 
 def values_at(path: Path, phases: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,17 +10,21 @@ from threadpoolctl import threadpool_limits
 
 from slipsweep.errors import InputError
 from slipsweep.model import options, parameters, variables
-from slipsweep.motion.shaking import RESPONSES, TABLE, ShakingTest
+from slipsweep.motion.shaking import TABLE, ShakingTest
 from slipsweep.studies import friction
 from slipsweep.studies.estimate import Estimate, cycle_estimate, estimate
 from slipsweep.studies.friction import Floats
 from slipsweep.studies.likelihood import SOUGHT, Observation, runs_of
+from slipsweep.studies.noise import flat_top, noisy_flat_top
 
 #: The peak of a cycle at least, and what a table that moves exceeds, in parts of its largest
 #: acceleration; fewest samples of a cycle.
 _A_CYCLE = 0.1
 _MOVES = 0.1
 _FEWEST_IN_A_CYCLE = 12
+
+#: Channels, and the ends of them, at which only the end of a range is flat.
+_RANGES = {TABLE: (1, -1), "block_acceleration": (-1,), "relative_velocity": (1, -1)}
 
 #: Symbols and units of what is sought.
 _SYMBOL = ("Üy", "λ", "Δμ")
@@ -45,7 +49,8 @@ def calibrate(
 
     The table's recorded motion shakes the model's block, and what it does is fitted to whatever was
     measured of the real one, each channel weighted by its noise.  The noise of the table's own
-    record enters the intervals.
+    record enters the intervals, and so does the correlation of neighbouring samples of the noise.
+    If several solutions fit, an interval holds them all.  A channel that is cut off is named.
 
     Parameters
     ----------
@@ -134,14 +139,14 @@ def calibrate(
         found = estimate(observations)
         if "continuous" not in found.readings:
             for one in observations:
-                one.leave_out_upslope_slips()
+                one.leave_out_upslope_slips(found.of_test(one))
             if any(one.upslope for one in observations):
                 found = estimate(observations)
-        statics = [_statics(one) for one in observations]
+        statics = [_statics(one, found) for one in observations]
         constant = next((one for one in statics if one.attrs["constant_friction"]), None)
-        misfit = (
-            [] if constant is not None else _misfit(found, lambda name: estimate(observed(name)))
-        )
+        clipped = [text for one, name in _named(observations) for text in _clipped(one, name)]
+        is_explained = constant is not None or bool(clipped)
+        misfit = [] if is_explained else _misfit(found, lambda name: estimate(observed(name)))
         parts = [_of_test(one, found, cycles) for one in observations]
         whole = (
             parts[0]
@@ -155,7 +160,7 @@ def calibrate(
         **(tests[0].attrs if len(tests) == 1 else {"tests": ", ".join(one.name for one in tests)}),
         **options.MODELS.attributes(chosen),
         "removed": "; ".join(dict.fromkeys(one.attrs["removed"] for one in parts)),
-        **_report(found, whole, constant, misfit),
+        **_report(found, whole, constant, clipped, misfit),
     }
     return whole
 
@@ -163,21 +168,21 @@ def calibrate(
 def _of_test(one: Observation, found: Estimate, cycles: bool) -> xr.Dataset:
     """What belongs to one test: measured and computed series, misfits, cycles; the attribute `removed`."""
     test = one.test
-    history = one.forward(found.parameters, one.test.times)
-    added, removed = _removed(one, found.parameters)
+    parameters = found.of_test(one)
+    history = one.forward(parameters, one.test.times)
+    removed = _removed(one, found)[1]
     about = variables.CALIBRATION_SERIES | variables.MEASURED_FRICTION
-    series = {f"measured_{name}": values - added[name] for name, values in test.channels.items()}
+    channels = _measured(one, found)
+    series = {f"measured_{name}": values for name, values in channels.items()}
     series |= {f"computed_{name}": values for name, values in history.items()}
-    block = _block_acceleration(test)
+    block = _block_acceleration(test, channels)
     if block is not None:
-        block = block - added.get("block_acceleration", 0.0)
-        table = series[f"measured_{TABLE}"]
         series["friction_coefficient"] = friction.eq1_friction(
-            table, block, one.theta, one.mu_s, one.model.g
+            channels[TABLE], block, one.theta, one.mu_s, one.model.g
         )
         series["free_body_friction"] = friction.free_body_friction(block, one.theta, one.model.g)
     data: dict[str, Any] = {name: ("time", values, about[name]) for name, values in series.items()}
-    for name, misfit in zip(one.channels, one.misfits(found.parameters), strict=True):
+    for name, misfit in zip(one.channels, one.misfits(parameters), strict=True):
         span = max(float(np.nanmax(np.abs(history[name]))), 1e-300)
         long_name = (
             f"root mean square of measured less computed {variables.HISTORY[name]['long_name']}"
@@ -196,12 +201,20 @@ def _of_test(one: Observation, found: Estimate, cycles: bool) -> xr.Dataset:
     return dataset.merge(_cycles(one, found)) if cycles else dataset
 
 
-def _removed(one: Observation, parameters: Floats) -> tuple[dict[str, Floats], list[str]]:
+def _measured(one: Observation, found: Estimate) -> dict[str, Floats]:
+    """Return the channels of a test, less offsets, drifts and steps."""
+    added, _ = _removed(one, found)
+    return {name: values - added[name] for name, values in one.test.channels.items()}
+
+
+def _removed(one: Observation, found: Estimate) -> tuple[dict[str, Floats], list[str]]:
     """What offsets, drifts and steps add to each channel, and each in words with its standard error."""
     added = {name: np.zeros(one.test.times.size) for name in one.test.channels}
     texts = []
-    sizes = np.transpose(one.linear.nuisances(parameters))[one.motion.shapes.shape[1] :]
-    for line, (size, error) in zip(one.lines, sizes, strict=True):
+    of_table = np.transpose(found.lines_of(one))
+    of_block = np.transpose(one.nuisances(found.of_test(one)))[one.wrong.size :]
+    lines = [*one.table_lines, *one.lines]
+    for line, (size, error) in zip(lines, [*of_table, *of_block], strict=True):
         added[line.channel] = added[line.channel] + size * line.values
         units = variables.HISTORY[line.channel]["units"] + " over the whole test" * (
             line.name == "drift"
@@ -214,7 +227,7 @@ def _removed(one: Observation, parameters: Floats) -> tuple[dict[str, Floats], l
 
 def _cycles(one: Observation, found: Estimate) -> xr.Dataset:
     """Each cycle by itself: estimates, standard errors and Kd."""
-    motion = one.motion
+    motion = one.record(found.lines_of(one)[0])
     times = one.test.times
     continuous = "continuous" in found.readings
     least = max(found.parameters[0], _A_CYCLE * one.peak)
@@ -230,20 +243,19 @@ def _cycles(one: Observation, found: Estimate) -> xr.Dataset:
     }
     data["cycle_start"][:] = starts = [motion.times[part.start] for part in pulses]
     data["cycle_peak_acceleration"][:] = [motion.acceleration[part].max() for part in pulses]
-    speed = max(
-        float(np.abs(one.forward(found.parameters, times)["relative_velocity"]).max()), 1e-6
-    )
+    parameters = found.of_test(one)
+    speed = max(float(np.abs(one.forward(parameters, times)["relative_velocity"]).max()), 1e-6)
     for row, (begin, end) in enumerate(zip(starts, [*starts[1:], motion.times[-1]], strict=True)):
         inside = (times >= begin) & (times < end)
         if inside.sum() < _FEWEST_IN_A_CYCLE:
             continue
-        values, errors = cycle_estimate(
-            one.cycle(begin, end, speed), found, [1, 2] if continuous else [0, 1, 2]
-        )
+        of_cycle = one.cycle(begin, end, speed, parameters, found.lines_of(one)[1])
+        values, errors = cycle_estimate(of_cycle, parameters, [1, 2] if continuous else [0, 1, 2])
         for name, value, error in zip(SOUGHT, values, errors, strict=True):
             data[f"cycle_{name}"][row] = value
             data[f"cycle_{name}_error"][row] = error
-        history = one.forward(np.where(np.isfinite(values), values, found.parameters), times)
+        fitted = np.where(np.isfinite(values), values, found.parameters)
+        history = one.forward(np.append(fitted, parameters[3:]), times)
         slides = inside & (history[TABLE] > 0.0)
         if slides.any() and not continuous:
             data["cycle_attenuation_coefficient"][row] = (
@@ -293,21 +305,35 @@ def _of_all(found: Estimate) -> xr.Dataset:
     return xr.Dataset(data, coords)
 
 
-def _report(
-    found: Estimate, results: xr.Dataset, constant: xr.Dataset | None, misfit: Sequence[str]
-) -> dict[str, str]:
-    """All that must be said of a calibration, as attributes of its results.
+def _named(observations: Sequence[Observation]) -> list[tuple[Observation, str]]:
+    """Return tests, each with the beginning of a sentence on it: its name, if there are several."""
+    several = len(observations) > 1
+    return [(one, f"{one.test.name}: " if several else "") for one in observations]
 
-    `constant` are the coefficients of a test in which friction was constant, `misfit` sentences.
+
+def _report(
+    found: Estimate,
+    results: xr.Dataset,
+    constant: xr.Dataset | None,
+    clipped: Sequence[str],
+    misfit: Sequence[str],
+) -> dict[str, str]:
+    """Return all that must be said of a calibration, as attributes of its results.
+
+    `constant` are the coefficients of a test in which friction was constant, `clipped` and `misfit`
+    sentences.
     The tables for a sweep file are commented out where the calibration has failed or determines too
     little.
     """
     sentence = "" if constant is None else constant.attrs["constant_friction"]
     slides = bool((results["permanent_displacement"] != 0.0).any())
-    said = [sentence] if sentence else [*misfit]
+    named = _named(found.observations)
+    said = [*clipped, *([sentence] if sentence else misfit)]
+    said += [text for one, name in named for text in _colours(one, name)]
     for one in found.observations:
-        first = float(one.motion.acceleration[0])
-        most = float(np.abs(one.motion.acceleration).max())
+        motion = one.table_acceleration(found.lines_of(one)[0])
+        first = float(motion[0])
+        most = float(np.abs(motion).max())
         if abs(first) > max(_MOVES * most, 3.0 * one.motion.noise):
             said.append(
                 f"The table moves as the record begins, at {first:.3g} m/s2. The block is taken to be at rest there. "
@@ -326,14 +352,17 @@ def _report(
     elif not found.determined.all():
         said += _undetermined(found)
     contradictions = [text for one in found.observations for text in _contradiction(found, one)]
+    contradictions += [text for one, name in named for text in _outliers(found, one, name)]
     said += contradictions
     if (results["validity"] & variables.Validity.NOT_RECOUPLED).any():
         said.append(
-            "The computed block does not come to rest before the next slide begins (flag not_recoupled)."
+            "The computed block does not come to rest before the next slide begins (flag "
+            "not_recoupled). Small errors of the table's motion may then change the motion much: the "
+            "intervals may be too narrow."
         )
-    if constant is not None:
+    if constant is not None and not clipped:
         tables = _newmark_tables(found.observations[0], constant)
-    elif found.determined.all() and slides and not misfit and not contradictions:
+    elif found.determined.all() and slides and not [*clipped, *misfit, *contradictions]:
         tables = _model_table(found), _uncertainty_table(found)
     else:
         comments = ["WARNING: not ready for use.", *said, "", *_model_table(found).splitlines()]
@@ -348,33 +377,107 @@ def _report(
     )
 
 
-def _block_acceleration(test: ShakingTest) -> Floats | None:
-    """The block's acceleration, measured or from the relative velocity; None without either."""
-    if "block_acceleration" in test.channels or "relative_velocity" not in test.channels:
-        return test.channels.get("block_acceleration")
-    return np.asarray(
-        test.channels[TABLE] - np.gradient(test.channels["relative_velocity"], test.times)
-    )
+def _block_acceleration(test: ShakingTest, channels: Mapping[str, Floats]) -> Floats | None:
+    """Return the block's acceleration, measured or from its velocity; None without either."""
+    if "block_acceleration" in channels or "relative_velocity" not in channels:
+        return channels.get("block_acceleration")
+    return np.asarray(channels[TABLE] - np.gradient(channels["relative_velocity"], test.times))
 
 
-def _statics(one: Observation) -> xr.Dataset:
+def _slides(
+    one: Observation, found: Estimate, table: Floats, block: Floats
+) -> tuple[list[slice], float]:
+    """Return the slides of a test, and the threshold by which they are told from noise."""
+    threshold = friction.threshold_of(one.test.channels[TABLE], block)[0]
+    if "block_acceleration" in one.channels:  # neighbours show too little of coloured noise
+        row = one.channels.index("block_acceleration")
+        noise = math.hypot(
+            one.noise_seen(found.of_test(one))[row], one.motion.noise * (one.motion.colour > 0.0)
+        )
+        threshold = max(threshold, friction.NOISE_IN_THRESHOLD * noise)
+    return friction.slides_of(one.test.times, table, block, threshold), threshold
+
+
+def _statics(one: Observation, found: Estimate) -> xr.Dataset:
     """Friction by statics; nothing where neither the block's acceleration nor its velocity is measured."""
-    block = _block_acceleration(one.test)
+    block = _block_acceleration(one.test, _measured(one, found))
     if block is None:
         return xr.Dataset(attrs={"constant_friction": ""})
-    table = np.interp(one.test.times, one.motion.times, one.motion.acceleration)
-    slides = friction.slides_of(
-        one.test.times, table, block, friction.threshold_of(table, block)[0]
-    )
+    table = _smooth_table(one, found)
+    slides, _ = _slides(one, found, table, block)
     return friction.coefficients_of(table, block, slides, one.mu_s, one.theta, one.model.g)
+
+
+def _smooth_table(one: Observation, found: Estimate) -> Floats:
+    """Return the table's motion at the samples, less offset and drift of its sensor."""
+    motion = one.recorded_acceleration(found.lines_of(one)[0])
+    return np.interp(one.test.times, one.motion.times, motion)
+
+
+def _clipped(one: Observation, name: str) -> list[str]:
+    """Return which channels are at the end of their range, in words.
+
+    Tops at which a block holds its acceleration or its displacement, or bottoms at which it is at
+    rest, are flat without that.
+    """
+    texts = []
+    for channel, signs in _RANGES.items():
+        values = one.test.channels.get(channel, np.zeros(1))
+        largest = float(np.nanmax(np.abs(values)))
+        ends = []
+        for sign in signs:
+            end = float(np.nanmax(sign * values))
+            is_flat = flat_top(sign * values) > 0
+            if channel == TABLE and not is_flat:
+                is_flat = noisy_flat_top(sign * values) > 0
+            if is_flat and end > _MOVES * largest:
+                ends.append(f"{sign * end:.4g}")
+        if ends:
+            units = variables.HISTORY[channel]["units"]
+            texts += [
+                f"{name}{channel} is cut off: it is flat at {' and '.join(ends)} {units}, as of a "
+                "sensor or converter at the end of its range.",
+                "The intervals do not include what is cut off. Test with a larger range.",
+            ]
+    return texts
+
+
+def _colours(one: Observation, name: str) -> list[str]:
+    """Return sentences on coloured noise, if there is some."""
+    table = "" if one.motion.rests else "at most "
+    colours = [(TABLE, table, one.motion.colour)]
+    colours += [
+        (channel, "", colour) for channel, colour in zip(one.channels, one.colour, strict=True)
+    ]
+    listed = [
+        f"{bound}{colour:.2f} in {channel}" for channel, bound, colour in colours if colour > 0.0
+    ]
+    if not listed:
+        return []
+    texts = [
+        f"{name}The noise is coloured. The correlation of neighbouring samples of it is "
+        f"{', '.join(listed)}.",
+        "Intervals and standard errors include it as noise of first order.",
+    ]
+    if not one.motion.rests:
+        texts.append(
+            f"How slow the noise of {TABLE} is cannot be told while the table moves: the intervals "
+            "may be too narrow. Let the record begin with half a second at rest."
+        )
+    return texts
 
 
 def _misfits(found: Estimate) -> dict[str, float]:
     """Channels whose misfit is more than 1.5 times their noise and 1 % of their largest value, and how many times."""
     worse: dict[str, float] = {}
     for one in found.observations:
+        parameters = found.of_test(one)
         of_channels = zip(
-            one.channels, one.misfits(found.parameters), one.sensor_noise, one.largest, strict=True
+            one.channels,
+            one.misfits(parameters),
+            one.noise_seen(parameters),
+            one.largest,
+            strict=True,
         )
         for name, misfit, noise, largest in of_channels:
             if misfit > max(1.5 * noise, 0.01 * largest):
@@ -388,10 +491,11 @@ def _misfit(found: Estimate, with_drift: Callable[[str], Estimate]) -> list[str]
         return []
     listed = ", ".join(f"{name} {times:.2g} times" for name, times in misfits.items())
     said = [
-        f"The misfit is larger than the noise of the sensors: {listed}. The block did not move as in the model, or a "
-        "sensor drifts: do not use the parameters before you know why (see the figure)."
+        f"The misfit is larger than the noise of the sensors: {listed}. The block did not move as in "
+        "the model, a sensor drifts, or its noise is slow: do not use the parameters before you know "
+        "why (see the figure)."
     ]
-    for name in RESPONSES:
+    for name in misfits:
         may_drift = all(
             name in one.channels and name not in one.drifts for one in found.observations
         )
@@ -402,14 +506,12 @@ def _misfit(found: Estimate, with_drift: Callable[[str], Estimate]) -> list[str]
 
 
 def _contradiction(found: Estimate, one: Observation) -> list[str]:
-    """A lower bound of Üy that is larger than the accelerations at which the block was seen to begin to slide."""
+    """Say if the interval of Üy begins above where the block was seen to begin to slide."""
     if "block_acceleration" not in one.channels or "continuous" in found.readings:
         return []
-    times = one.test.times
-    block = one.test.channels["block_acceleration"]
-    table = np.interp(times, one.motion.times, one.motion.acceleration)
-    threshold = friction.threshold_of(one.test.channels[TABLE], block)[0]
-    slides = friction.slides_of(times, table, block, threshold)
+    block = _measured(one, found)["block_acceleration"]
+    table = _smooth_table(one, found)
+    slides, threshold = _slides(one, found, table, block)
     onsets = np.array(
         [friction.onset_acceleration(table, block, slide, threshold) for slide in slides]
     )
@@ -420,14 +522,27 @@ def _contradiction(found: Estimate, one: Observation) -> list[str]:
     least = found.intervals[0][0]
     seen = np.median(onsets)
     text = (
-        f"Üy is at least {least:.3g} m/s2 by the fit, but the block was seen to begin to slide at {seen:.3g} m/s2: the "
-        "fit contradicts the test."
+        f"The 95 % interval of Üy begins at {least:.3g} m/s2, but the block was seen to begin to "
+        f"slide at {seen:.3g} m/s2: the fit contradicts the test."
     )
     return (
         [text]
         if least > seen + step + threshold + 3.0 * np.std(onsets) / len(onsets) ** 0.5
         else []
     )
+
+
+def _outliers(found: Estimate, one: Observation, name: str) -> list[str]:
+    """Return which samples contradict the solution, in words."""
+    texts = []
+    for channel, (times, most) in one.contradicting(found.of_test(one)).items():
+        units = variables.HISTORY[channel]["units"]
+        samples = "1 sample" if times.size == 1 else f"{times.size} samples"
+        texts.append(
+            f"{name}{samples} of {channel} cannot be noise: up to {most:.3g} {units} off what is "
+            f"computed, first at {times[0]:.4g} s. A sensor failed there, or the solution is wrong."
+        )
+    return texts
 
 
 def _undetermined(found: Estimate) -> list[str]:
@@ -457,9 +572,13 @@ def _undetermined(found: Estimate) -> list[str]:
         ): "Where Eq. 4 holds the block to the table until the table's acceleration has passed Üy, the "
         "motion does not depend on Üy.",
     }.get((yields, crosses), "")
+    two = ""
+    if found.apart:
+        onsets = " or ".join(f"{onset:.3g}" for onset in found.apart)
+        two = f"Several solutions fit: Üy is about {onsets} m/s2, and nothing between."
     return [
-        f"{listed} {are} not determined by {tests}: {ranges}.",
-        *([why] if why else []),
+        f"{listed} {are} not determined by {tests}: 95 % intervals {ranges}.",
+        *filter(None, [two, why]),
         _remedy(found),
     ]
 
@@ -556,7 +675,9 @@ def _newmark_tables(one: Observation, coefficients: xr.Dataset) -> tuple[str, st
         f'[model]\nfriction = "newmark"\nyield_acceleration = {_number(value)}  # 95 %: {low:.4g} to {high:.4g} m/s2\n'
         f"g = {one.model.g:g}\n"
     )
-    lines = _normal("yield_acceleration", value, max((high - low) / 3.92, 1e-6 * value))
+    lines = _normal(
+        "yield_acceleration", value, max((high - low) / (2.0 * friction.QUANTILE), 1e-6 * value)
+    )
     return model, "\n".join(["[uncertainty]", *lines]) + "\n"
 
 

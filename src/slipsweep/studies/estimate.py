@@ -6,6 +6,7 @@ likelihood's, the union over these branches, each compared with its own least (d
 """
 
 import functools
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -16,20 +17,22 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, least_squares
 
 from slipsweep.studies.datasets import sweep
-from slipsweep.studies.friction import Floats
-from slipsweep.studies.likelihood import SOUGHT, Linear, Observation, runs_of
+from slipsweep.studies.friction import QUANTILE, Floats
+from slipsweep.studies.likelihood import SOUGHT, Observation, runs_of
 
 #: What decides the block's acceleration, of each test.
 Readings = tuple[str, ...]
 
 #: Rise of the sum of squares at the ends of a 95 % interval, and of the least of a branch by which
 #: it is refuted.
-SQUARE = 3.841
+SQUARE = QUANTILE**2
 REFUTED = 9.0
 
-#: Bounds of the search: Üy over the table's peak A, λA/g, ln(1 + Δμ/μs).
+#: Bounds of the search: Üy over the table's peak A, λA/g, ln(1 + Δμ/μs); how far an offset of the
+#: table's sensor, and a drift over the test, may be from where the search begins, in parts of A.
 LEAST = np.array([1e-4, 0.0, 0.0])
 MOST = np.array([1.0, 20.0, 3.0])
+_TABLE_LINE = 0.5
 
 #: Where the search begins.
 _ONSETS = (0.03, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
@@ -37,25 +40,76 @@ _DECAYS = (0.25, 0.5, 1.0, 2.0, 4.0)
 _EXCESS = (0.02, 0.1, 0.25)
 
 #: Starts that are followed roughly, and to the end; rounds at most in which motion, noise and
-#: samples at jumps settle.
+#: samples at jumps settle, and the largest change of a noise, in parts of it, or of a correlation
+#: with which they have.
 _ROUGH = 8
 _FINE = 4
-_ROUNDS = 5
+_ROUNDS = 6
+_SETTLED = 0.1
+
+#: Least noise in the stages of the search, in parts of a channel's largest value, and values of Üy
+#: in parts of the peak at which the second stage looks for minima: with λ and Δμ fitted, and as
+#: they are.
+_STAGES = (0.1, 0.01, 1e-3)
+_LOOKS = np.arange(1, 33) / 33.0
+_CLOSE_LOOKS = np.arange(1, 160) / 160.0
+
+#: Minima that are followed, at this distance in Üy at least in parts of the peak, and the rise of
+#: the sum of squares above the least beyond which none can become the least; the distance from
+#: which on minima are said to be several solutions.
+_MINIMA = 6
+_APART = 0.004
+_HOPELESS = 60.0
+_SEVERAL = 0.02
+
+#: Fall of the sum of squares as the residuals are linearised anew, with which they are not linear;
+#: how many times at most an end of the interval of Üy is followed so; rise of the least of a branch
+#: up to which it may be refuted wrongly.
+_NOT_LINEAR = 1.0
+_TURNS = 3
+_NARROWLY = 20.0
 
 
 class Scale:
-    """Scaled parameters of the search, a point, and Üy, λ, Δμ."""
+    """Scaled parameters of the search, a point, and Üy, λ, Δμ.
+
+    A point also has the offset and the drift of the table's sensor of each test that has them, in
+    parts of the peak.
+    """
 
     def __init__(self, observations: Sequence[Observation]) -> None:
         self.peak = max(one.peak for one in observations)
         self.mu_s = observations[0].mu_s
         self.g = observations[0].model.g
         self.tan_theta = math.tan(math.radians(observations[0].theta))
+        self.first_lines = np.concatenate([one.first_sizes for one in observations]) / self.peak
+        self.least = np.append(LEAST, self.first_lines - _TABLE_LINE)
+        self.most = np.append(MOST, self.first_lines + _TABLE_LINE)
+        ends = np.cumsum([3, *(one.first_sizes.size for one in observations)])
+        self._lines = [slice(begin, end) for begin, end in itertools.pairwise(ends)]
+
+    def point(self, onset: float, decay: float, excess: float) -> Floats:
+        """Return a point with offset and drift of the table where the search begins."""
+        return np.asarray(np.clip([onset, decay, excess, *self.first_lines], self.least, self.most))
 
     def parameters(self, point: Floats) -> Floats:
+        """Return Üy, λ and Δμ."""
         return np.array(
             [point[0] * self.peak, point[1] * self.g / self.peak, self.mu_s * math.expm1(point[2])]
         )
+
+    def lines(self, number: int) -> slice:
+        """Return which parts of a point are offset and drift of the table in a test."""
+        return self._lines[number]
+
+    def of_test(self, point: Floats, number: int) -> Floats:
+        """Return Üy, λ and Δμ, and offset and drift of the table in a test."""
+        return np.append(self.parameters(point), self.peak * point[self._lines[number]])
+
+    def slopes(self, point: Floats) -> Floats:
+        """Return the derivatives of all parameters by those of the point."""
+        first = [self.peak, self.g / self.peak, self.mu_s * math.exp(point[2])]
+        return np.append(first, np.full(self.first_lines.size, self.peak))
 
     def reading(self, point: Floats, peak: float) -> str:
         """What decides the block's acceleration in a test with this peak of the table's.
@@ -64,7 +118,7 @@ class Scale:
         where it crosses the table's acceleration on; Üy plays no part.  One value throughout:
         "held", Üy; "crossed", that at the crossing.
         """
-        onset, decay, excess = point
+        onset, decay, excess = point[:3]
         table = np.linspace(0.0, 1.0, 65)[1:] * peak
         coupled = (
             self.mu_s - self.tan_theta - self.mu_s * np.exp(excess - decay * table / self.peak)
@@ -110,11 +164,17 @@ class Search:
     """Independent residuals and readings (`Scale.reading`) of points, and all points that were tried."""
 
     def __init__(
-        self, residuals: Callable[[Floats], Floats], readings: Callable[[Floats], Readings]
+        self,
+        residuals: Callable[[Floats], Floats],
+        readings: Callable[[Floats], Readings],
+        least: Floats = LEAST,
+        most: Floats = MOST,
     ) -> None:
         self._residuals = residuals
         self._readings = readings
+        self._bounds = (least, most)
         self.tried: list[Tried] = []
+        self.minima: list[Tried] = []
         self._least: dict[Readings, float] = {}
 
     def residuals(self, point: Floats) -> Floats:
@@ -125,10 +185,14 @@ class Search:
         self._least[branch] = min(self.tried[-1].square, self._least.get(branch, math.inf))
         return rest
 
+    def at(self, point: Floats) -> Tried:
+        """Try a point."""
+        self.residuals(point)
+        return self.tried[-1]
+
     def square(self, point: Floats) -> float:
         """Sum of squares."""
-        self.residuals(point)
-        return self.tried[-1].square
+        return self.at(point).square
 
     @property
     def least(self) -> float:
@@ -146,6 +210,28 @@ class Search:
     def allowed(self) -> list[Tried]:
         return [one for one in self.tried if self.above(one) <= SQUARE]
 
+    def outermost(self, side: int) -> Floats:
+        """Return the allowed point of least (`side` −1) or largest (1) Üy."""
+        return max((one.point for one in self.allowed()), key=lambda point: side * point[0])
+
+    def refuted_narrowly(self) -> list[Floats]:
+        """Return the best points of readings that are refuted, but narrowly."""
+        return [
+            point
+            for point in self.leaders()
+            if self.square(point) < self.least + _NARROWLY
+            and not math.isfinite(self.above(self.at(point)))
+        ]
+
+    def least_tried(self) -> float:
+        """Return the least sum of squares of the points that were tried here."""
+        return min(one.square for one in self.tried)
+
+    def adopt(self, other: "Search") -> None:
+        """Compare with the least of each branch that another search has found, too."""
+        for branch, square in other._least.items():
+            self._least[branch] = min(square, self._least.get(branch, math.inf))
+
     def leaders(self) -> list[Floats]:
         """The best point of each reading, the best of all first."""
         found: dict[Readings, Floats] = {}
@@ -154,12 +240,15 @@ class Search:
         return list(found.values())
 
     def polish(
-        self, start: Floats, free: Sequence[int] = (0, 1, 2), most: int = 12, loss: str = "linear"
+        self,
+        start: Floats,
+        free: Sequence[int] | None = None,
+        most: int = 12,
+        loss: str = "linear",
     ) -> Floats:
-        """Least squares over some parameters, from a start; the point found."""
-        free = list(free)
-        low = LEAST[free]
-        high = MOST[free]
+        """Return the point of least squares over some parameters, by default all, from a start."""
+        free = [*range(start.size)] if free is None else list(free)
+        low, high = (bound[free] for bound in self._bounds)
         found = least_squares(
             lambda part: self.residuals(_with(start, free, part)),
             np.clip(start[free], low + 1e-9, high - 1e-9),
@@ -173,12 +262,47 @@ class Search:
         )
         return _with(start, free, found.x)
 
+    def follow(self, start: Floats) -> None:
+        """Find the minimum that a start leads to."""
+        first = len(self.tried)
+        self.polish(start)
+        self.minima.append(min(self.tried[first:], key=lambda one: one.square))
+
+    def candidates(self) -> list[Floats]:
+        """Return the best point of each reading, the best of all first, and other minima."""
+        points = self.leaders()[:_MINIMA]
+        for minimum in sorted(self.minima, key=lambda one: one.square):
+            near = min(abs(minimum.point[0] - point[0]) for point in points)
+            if near > _APART and minimum.square < self.least + _HOPELESS and len(points) < _MINIMA:
+                points.append(minimum.point)
+        return points
+
+    def apart(self) -> list[float]:
+        """Return Üy of minima that the data allow with values between that they do not.
+
+        It is in parts of the peak.
+        """
+        minima = sorted(self.candidates(), key=lambda point: point[0])
+        allowed = [point for point in minima if self.above(self.at(point)) <= SQUARE]
+        onsets: list[float] = []
+        for low, high in itertools.pairwise(allowed):
+            if high[0] - low[0] < _SEVERAL:
+                continue
+            between = [
+                _with(low, [0], part * low[0] + (1.0 - part) * high[0]) for part in (0.3, 0.5, 0.7)
+            ]
+            others = [*range(1, low.size)]
+            tried = [self.at(self.polish(point, others, most=6)) for point in between]
+            if max(map(self.above, tried)) > SQUARE:
+                onsets += [low[0], high[0]]
+        return sorted(set(onsets))
+
     def slopes(self, point: Floats) -> Floats:
         """Derivatives of the residuals by the parameters, a column each."""
         columns = []
         for at, step in enumerate(1e-5 * np.eye(point.size)):
-            low = np.clip(point - step, LEAST, MOST)
-            high = np.clip(point + step, LEAST, MOST)
+            low = np.clip(point - step, *self._bounds)
+            high = np.clip(point + step, *self._bounds)
             columns.append((self.residuals(high) - self.residuals(low)) / (high - low)[at])
         return np.column_stack(columns)
 
@@ -193,7 +317,7 @@ class Search:
                 break
             self.polish(self.best)
         # what the profile of one parameter passed through may lie beyond the end of another's
-        every = np.vstack([found.T, [one.point for one in self.allowed()]])
+        every = np.vstack([found.T, [one.point[:3] for one in self.allowed()]])
         return np.column_stack([every.min(axis=0), every.max(axis=0)])
 
     def end(self, at: int, side: int, width: float) -> float:
@@ -228,7 +352,7 @@ class Search:
                 path[value] = point
             return math.sqrt(min(max(above, 0.0), 30.0)) - math.sqrt(SQUARE)
 
-        limit = float((LEAST, MOST)[side > 0][at])
+        limit = float(self._bounds[side > 0][at])
         inside = float(start[at])
         step = width
         if inside == limit:
@@ -253,10 +377,14 @@ class Search:
             for table in (0.3, 0.6, 1.0)
             if at > 0
         ]
-        starts = [near, near + change * along, *(near + change * np.array(one) for one in kept)]
+        starts = [
+            near,
+            near + change * along,
+            *(near + change * np.resize(one + [0.0] * (near.size - 3), near.size) for one in kept),
+        ]
         first = len(self.tried)
         for start in starts:
-            self.residuals(_with(np.clip(start, LEAST, MOST), [at], value))
+            self.residuals(_with(np.clip(start, *self._bounds), [at], value))
         held = sorted(self.tried[first:], key=lambda one: one.square)
         if min(map(self.above, held)) > SQUARE:
             others = [one for one in range(near.size) if one != at]
@@ -272,7 +400,9 @@ class Estimate(NamedTuple):
     `intervals`, (3, 2), are at 95 %, 0 and inf where the data set no bound, and `determined` the
     parameters that these bound well enough.  `errors` and `correlation`, of the linear fit, are NaN
     of the others.  `allowed` are parameters tried that the data allow, one set a row, `readings`
-    what decides the acceleration for these (`Scale.reading`).
+    what decides the acceleration for these (`Scale.reading`).  `apart` are values of Üy that the
+    data allow, if those between are not allowed.  `table_lines` are offset and drift of the table's
+    sensor in each test, with their standard errors.
     """
 
     parameters: Floats
@@ -282,72 +412,211 @@ class Estimate(NamedTuple):
     determined: NDArray[np.bool_]
     allowed: Floats
     readings: set[str]
+    apart: Sequence[float]
     observations: Sequence[Observation]
+    table_lines: Sequence[tuple[Floats, Floats]]
+
+    def lines_of(self, observation: Observation) -> tuple[Floats, Floats]:
+        """Return offset and drift of the table's sensor in a test, and their standard errors."""
+        return self.table_lines[[each is observation for each in self.observations].index(True)]
+
+    def of_test(self, observation: Observation) -> Floats:
+        """Return Üy, λ and Δμ, and offset and drift of the table's sensor in a test."""
+        return np.append(self.parameters, self.lines_of(observation)[0])
 
     def summary(self, one: Observation, **more: Any) -> xr.Dataset:
         """The results of a sweep for the parameters found, and the table's motion of a test; `more` replaces them."""
         given = {**dict(zip(SOUGHT, map(float, self.parameters), strict=True)), **more}
-        return sweep(one.theta, one.mu_s, excitation=one.record(), model=one.model, **given)
+        record = one.record(self.lines_of(one)[0])
+        return sweep(one.theta, one.mu_s, excitation=record, model=one.model, **given)
 
 
 def estimate(observations: Sequence[Observation]) -> Estimate:
     """Calibrate one or several tests of one interface."""
     scale = Scale(observations)
-    starts = _rough(observations, scale)
+    starts = _first_minima(observations, scale)
+    change = math.inf
     for turn in range(_ROUNDS):
         search = _search(scale, observations, starts[0])
         for start in starts:
-            search.polish(start)
+            search.follow(start)
         if turn == 0:
             _try_branches(search, scale)
-        elif search.square(starts[0]) - search.least < 0.1:
+        elif change < _SETTLED and search.square(starts[0]) - search.least < 0.1:
             break
-        starts = search.leaders()
-        best = scale.parameters(search.best)
-        for one in observations:
-            one.settle(best)
-    width = 1.96 * np.sqrt(np.diag(_covariance(search.slopes(search.best))))
+        starts = search.candidates()
+        change = max(
+            one.settle(*_solutions(scale, starts, number))
+            for number, one in enumerate(observations)
+        )
+    width = QUANTILE * np.sqrt(np.diag(_covariance(search.slopes(search.best))))
     intervals = search.intervals(np.where(np.isfinite(width), np.clip(width, 1e-5, 0.3), 0.1))
-    intervals[0] = _beyond_mode_limit(intervals[0], observations, scale)
-    low, high = map(scale.parameters, intervals.T)
+    intervals, allowed = _linearised_anew(search, intervals, observations, scale)
+    intervals[0] = _beyond_mode_limit(intervals[0], search.best, observations, scale)
+    low, high = (scale.parameters(ends) for ends in intervals.T)
     low = np.where(intervals[:, 0] == LEAST, 0.0, low)
     high = np.where(intervals[:, 1] == MOST, np.inf, high)
-    allowed = search.allowed()
     best = scale.parameters(search.best)
     # half an interval is no more than half of the value, of Δμ 0.3 of μs + Δμ
     widest = 2.0 * np.array([0.5, 0.5, 0.3]) * np.abs(best + np.array([0.0, 0.0, scale.mu_s]))
     determined = np.isfinite(high) & (high - low <= widest) & [low[0] > 0.0, True, True]
-    slopes = np.array([scale.peak, scale.g / scale.peak, scale.mu_s * math.exp(search.best[2])])
+    apart = search.apart()
+    determined[0] &= not apart
+    slopes = scale.slopes(search.best)
     covariance = _covariance(search.slopes(search.best)) * np.outer(slopes, slopes)
-    errors = np.where(determined, np.sqrt(np.diag(covariance)), np.nan)
+    deviations = np.sqrt(np.diag(covariance))
+    # no correlation with a parameter that no residual depends on near the best
+    correlation = np.nan_to_num(covariance / np.outer(deviations, deviations))
+    np.fill_diagonal(correlation, 1.0)
+    errors = _errors(deviations[:3], best, low, high)
     return Estimate(
         best,
-        errors,
-        covariance / np.outer(errors, errors),
+        np.where(determined, errors, np.nan),
+        np.where(np.outer(determined, determined), correlation[:3, :3], np.nan),
         np.column_stack([low, high]),
         determined,
         np.array([scale.parameters(one.point) for one in allowed]),
         {reading for one in allowed for reading in one.readings},
+        [onset * scale.peak for onset in apart],
         observations,
+        [
+            (scale.of_test(search.best, number)[3:], deviations[scale.lines(number)])
+            for number in range(len(observations))
+        ],
     )
+
+
+def _linearised_anew(
+    search: Search, intervals: Floats, observations: Sequence[Observation], scale: Scale
+) -> tuple[Floats, list[Tried]]:
+    """Return intervals wide enough for what is far from the best, and all points allowed.
+
+    The residuals depend on errors of the table's motion linearly only near the point at which they
+    were linearised.  Far from it, at the ends of the interval of Üy and at the best of other
+    branches, they are linearised once more, with the motion of the table that is likely there.
+    """
+    best = search.best
+    base = [one.wrong for one in observations]
+    every = [np.transpose(intervals)]
+    allowed = search.allowed()
+
+    def near(before: Search, point: Floats) -> Search | None:
+        """Return a search linearised at a point; None if that changes little."""
+        square = before.square(point)
+        _linearise(observations, scale, point, _likely_motions(scale, observations, point))
+        after = _search_at(scale, observations)
+        after.adopt(search)
+        after.polish(point, free=range(1, point.size), most=6)
+        changes = after.least_tried() < square - _NOT_LINEAR
+        return after if changes and after.allowed() else None
+
+    width = float(np.clip(0.1 * np.ptp(intervals[0]), 1e-5, 0.3))
+    for side in (-1, 1):
+        _linearise(observations, scale, best, base)
+        before = search
+        for _ in range(_TURNS):
+            after = near(before, before.outermost(side))
+            if after is None:
+                break
+            after.end(0, side, width)
+            allowed += after.allowed()
+            before = after
+    for point in search.refuted_narrowly():
+        _linearise(observations, scale, best, base)
+        after = near(search, point)
+        if after is not None:
+            every.append(np.transpose(after.intervals(np.full(3, 0.05))))
+            allowed += after.allowed()
+    _linearise(observations, scale, best, base)
+    points = np.vstack([*every, [one.point[:3] for one in allowed]])
+    return np.column_stack([points.min(axis=0), points.max(axis=0)]), allowed
+
+
+def _linearise(
+    observations: Sequence[Observation], scale: Scale, point: Floats, motions: Sequence[Floats]
+) -> None:
+    """Linearise residuals near a point, with these errors of the table's motion."""
+    for number, (one, wrong) in enumerate(zip(observations, motions, strict=True)):
+        one.wrong = wrong
+        one.linearize(scale.of_test(point, number))
+
+
+def _likely_motions(
+    scale: Scale, observations: Sequence[Observation], point: Floats
+) -> list[Floats]:
+    """Return the most likely errors of the table's motion of each test at a point."""
+    return [
+        one.likely_motion(scale.of_test(point, number)) for number, one in enumerate(observations)
+    ]
+
+
+def _errors(deviations: Floats, best: Floats, low: Floats, high: Floats) -> Floats:
+    """Return standard errors: of the linear fit, or of the interval if that tells another story.
+
+    It does where the sum of squares is flat in a parameter, or has several minima; then the longer
+    side of the interval counts.
+    """
+    of_interval = (high - low) / (2.0 * QUANTILE)
+    agree = (deviations < 2.0 * of_interval) & (of_interval < 2.0 * deviations)
+    longer = np.maximum(high - best, best - low) / QUANTILE
+    return np.where(agree | ~np.isfinite(of_interval), deviations, longer)
+
+
+def _solutions(scale: Scale, points: Sequence[Floats], number: int) -> tuple[Floats, list[Floats]]:
+    """Return the parameters of a test for the first of some points, and for the others."""
+    first, *others = (scale.of_test(point, number) for point in points)
+    return first, others
 
 
 def _search(
-    scale: Scale, observations: Sequence[Observation], near: Floats, rough: bool = False
+    scale: Scale, observations: Sequence[Observation], near: Floats, rough: float = 0.0
 ) -> Search:
-    """A search by the likelihoods near a point."""
-    for one in observations:
-        one.linearize(scale.parameters(near), rough)
-    return Search(
-        lambda point: np.concatenate([one.linear(scale.parameters(point)) for one in observations]),
-        lambda point: tuple(scale.reading(point, one.peak) for one in observations),
-    )
+    """Return a search by the likelihoods near a point."""
+    for number, one in enumerate(observations):
+        one.linearize(scale.of_test(near, number), rough)
+    return _search_at(scale, observations)
 
 
-def _rough(observations: Sequence[Observation], scale: Scale) -> list[Floats]:
-    """Starts, the best first, by fits in which no sample counts for much."""
+def _search_at(scale: Scale, observations: Sequence[Observation]) -> Search:
+    """Return a search by the likelihoods as they are linearised."""
+
+    def residuals(point: Floats) -> Floats:
+        rests = [one.residuals(scale.of_test(point, at)) for at, one in enumerate(observations)]
+        return np.concatenate(rests)
+
+    def readings(point: Floats) -> Readings:
+        parts = (scale.of_test(point, at)[3:] for at in range(len(observations)))
+        peaks = (one.peak_of(part) for one, part in zip(observations, parts, strict=True))
+        return tuple(scale.reading(point, peak) for peak in peaks)
+
+    return Search(residuals, readings, scale.least, scale.most)
+
+
+def _first_minima(observations: Sequence[Observation], scale: Scale) -> list[Floats]:
+    """Return minima, the best first.
+
+    They are those of ever less noise, so that no sample counts for much at first.
+    """
+    largest = [noise for one in observations for noise in one.sensor_noise / one.largest]
+    points = _rough_minima(observations, scale)
+    for stage in _STAGES[1:]:
+        search = _search(scale, observations, points[0], rough=stage)
+        for point in points:
+            search.follow(point)
+        if stage == _STAGES[1]:
+            _look_along_onset(search)
+        points = search.candidates()
+        for number, one in enumerate(observations):
+            one.look_at_jumps([scale.of_test(point, number) for point in points])
+        if max(largest) > stage:
+            break
+    return points
+
+
+def _rough_minima(observations: Sequence[Observation], scale: Scale) -> list[Floats]:
+    """Return starts, the best first, by fits in which no sample counts for much."""
     starts = [
-        np.array([onset, decay, excess])
+        scale.point(onset, decay, excess)
         for onset in _ONSETS
         for decay in _DECAYS
         for excess in _EXCESS
@@ -355,20 +624,39 @@ def _rough(observations: Sequence[Observation], scale: Scale) -> list[Floats]:
     for onset in _ONSETS:  # Eq. 4 crosses there
         for decay in _DECAYS:
             excess = scale.excess(onset, onset, decay)
-            starts += [np.array([part * onset, decay, excess]) for part in (0.1, 0.6)]
-        starts.append(np.array([onset, MOST[1], 0.0]))  # the yield value governs
-    search = _search(scale, observations, starts[0], rough=True)
+            starts += [scale.point(part * onset, decay, excess) for part in (0.1, 0.6)]
+        starts.append(scale.point(onset, MOST[1], 0.0))  # the yield value governs
+    search = _search(scale, observations, starts[0], rough=_STAGES[0])
 
     def far(point: Floats) -> float:
-        return float(np.sum(np.log1p(search.residuals(np.clip(point, LEAST, MOST)) ** 2)))
+        return float(np.sum(np.log1p(search.residuals(point) ** 2)))
 
-    nearest = sorted((np.clip(one, LEAST, MOST) for one in starts), key=far)[:_ROUGH]
+    nearest = sorted(starts, key=far)[:_ROUGH]
     return sorted((search.polish(start, loss="cauchy") for start in nearest), key=far)[:_FINE]
+
+
+def _look_along_onset(search: Search) -> None:
+    """Follow the minima along Üy.
+
+    Two values of it can give the same velocity, of which one is right.  In continuous sliding Üy
+    and the acceleration at which the block would begin to slide as late by Eq. 4 do so, if the
+    table's acceleration crosses Eq. 4 between the two.
+    """
+    best = search.best
+    fitted = [search.polish(_with(best, [0], onset), free=(1, 2), most=3) for onset in _LOOKS]
+    for points in (fitted, [_with(best, [0], onset) for onset in _CLOSE_LOOKS]):
+        squares = np.array([search.square(point) for point in points])
+        padded = np.concatenate([[np.inf], squares, [np.inf]])
+        lowest = (squares < padded[:-2]) & (squares <= padded[2:])
+        order = np.flatnonzero(lowest)[np.argsort(squares[lowest])]
+        for at in order[:_FINE]:
+            search.follow(points[at])
 
 
 def _try_branches(search: Search, scale: Scale) -> None:
     """Try what Üy alone explains, and Eq. 4 that crosses the table's acceleration at the same value."""
-    starts = [np.array([onset, MOST[1], 0.0]) for onset in (search.best[0], 0.7)]
+    best = search.best
+    starts = [_with(best, [0, 1, 2], [onset, MOST[1], 0.0]) for onset in (best[0], 0.7)]
     held = min((search.polish(start, free=(0,)) for start in starts), key=search.square)[0]
     for decay in _DECAYS:
         top = scale.excess(1.0, min(1.05 * held, 0.99), decay)
@@ -379,22 +667,24 @@ def _try_branches(search: Search, scale: Scale) -> None:
             (0.3 * held, crossing),
             (0.9 * held, crossing),
         ):
-            search.square(np.clip([onset, decay, excess], LEAST, MOST))
+            point = np.clip([onset, decay, excess], LEAST, MOST)
+            search.square(_with(best, [0, 1, 2], point))
     for start in search.leaders():
-        search.polish(start)
+        search.follow(start)
 
 
-def _beyond_mode_limit(ends: Floats, observations: Sequence[Observation], scale: Scale) -> Floats:
+def _beyond_mode_limit(
+    ends: Floats, best: Floats, observations: Sequence[Observation], scale: Scale
+) -> Floats:
     """Ends of Üy's interval; where one lies at the mode limit (Eq. 7) of a pulse, the error of its peak moves it."""
     found = ends
     slope = 1.0 - scale.tan_theta * (scale.mu_s - scale.tan_theta)
-    for one in observations:
-        motion = one.record().acceleration
-        spread = np.sqrt(np.sum(one.motion.shapes**2, axis=1))
+    for number, one in enumerate(observations):
+        motion = one.table_acceleration(scale.of_test(best, number)[3:])
         for part in runs_of(motion > 0.0):
             top = part.start + int(np.argmax(motion[part]))
             limit = (slope * motion[top] - scale.g * scale.mu_s) / scale.peak
-            error = 1.96 * slope * spread[top] / scale.peak
+            error = QUANTILE * slope * one.motion.spread(top) / scale.peak
             beyond = np.clip(
                 [min(found[0], limit - error), max(found[1], limit + error)], LEAST[0], MOST[0]
             )
@@ -402,12 +692,18 @@ def _beyond_mode_limit(ends: Floats, observations: Sequence[Observation], scale:
     return found
 
 
-def cycle_estimate(linear: Linear, found: Estimate, free: list[int]) -> tuple[Floats, Floats]:
-    """Parameters and standard errors from the samples of one cycle; NaN of what these do not determine."""
-    start = found.parameters[free]
+def cycle_estimate(
+    of_cycle: Callable[[Floats], Floats], parameters: Floats, free: list[int]
+) -> tuple[Floats, Floats]:
+    """Return Üy, λ, Δμ and standard errors from the samples of one cycle.
+
+    Those that the samples do not determine are NaN.  `of_cycle` are the residuals of these samples;
+    `parameters` are those of the whole test, from which the search begins.
+    """
+    start = parameters[free]
 
     def residuals(part: Floats) -> Floats:
-        return linear(_with(found.parameters, free, part))
+        return of_cycle(_with(parameters, free, part))
 
     fit = least_squares(
         residuals,
@@ -424,7 +720,7 @@ def cycle_estimate(linear: Linear, found: Estimate, free: list[int]) -> tuple[Fl
     return _with(none, free, fit.x), _with(none, free, np.sqrt(np.diag(covariance)))
 
 
-def _with(point: Floats, free: list[int], part: Floats | float) -> Floats:
+def _with(point: Floats, free: list[int], part: Floats | Sequence[float] | float) -> Floats:
     """A point with other values of some parameters."""
     point = point.copy()
     point[free] = part

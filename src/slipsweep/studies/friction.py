@@ -30,6 +30,9 @@ from slipsweep.motion.shaking import CHANNELS, TABLE, ShakingTest, read_test, un
 
 Floats = NDArray[np.float64]
 
+#: Standard deviations of a normal distribution to either end of a 95 % interval.
+QUANTILE = 1.959964
+
 #: What a caller may give as a test.
 Test = str | Path | ShakingTest | xr.Dataset | Mapping[str, xr.DataArray]
 
@@ -224,7 +227,7 @@ def _mean(values: Floats, noise: float, systematic: float) -> Floats:
     scatter = (
         float(np.std(values, ddof=1)) * float(student.ppf(0.975, number - 1)) if number > 1 else 0.0
     )
-    half = max(scatter, 1.96 * noise) / number**0.5 + systematic
+    half = max(scatter, QUANTILE * noise) / number**0.5 + systematic
     return float(np.mean(values)) + np.array([-half, 0.0, half])
 
 

@@ -140,7 +140,9 @@ def simulate(
         raise InputError(
             "points_per_cycle: not allowed with a Record, whose samples are the points; give times"
         )
-    plan = plans.plan_sweep(inputs, excitation=motion, model=problem.model, solver=problem.solver)
+    plan = plans.plan_sweep(
+        inputs, excitation=motion, model=problem.model, solver=problem.solver, walked=True
+    )
     for name, variable in plan.coords.items():
         if variable.dims:
             raise InputError(f"{name}: simulate takes one case; must be a single number")

@@ -7,6 +7,7 @@ effects of one standard deviation of each, and are made independent by it.  Whic
 less, and why the table's motion is a spline: docs/calibration.md.
 """
 
+import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -14,8 +15,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
-from scipy.interpolate import BSpline, make_lsq_spline
-from scipy.linalg import cholesky, solve_triangular
 
 from slipsweep.errors import InputError
 from slipsweep.grid.inputs import Problem
@@ -28,6 +27,15 @@ from slipsweep.motion.cutting import path_of_record
 from slipsweep.motion.records import Record
 from slipsweep.motion.shaking import RESPONSES, TABLE, ShakingTest, check_channels
 from slipsweep.studies.friction import Floats, check_contact, noise_of
+from slipsweep.studies.noise import (
+    LEAST_NOISE,
+    colour_of,
+    converter_noise,
+    distances,
+    is_first_order,
+    whitened,
+)
+from slipsweep.studies.table import table_motion
 
 #: The series of `HISTORY` at some times, for Üy, λ and Δμ.
 Forward = Callable[[Floats, Floats], Mapping[str, Floats]]
@@ -35,32 +43,35 @@ Forward = Callable[[Floats, Floats], Mapping[str, Floats]]
 #: What is sought, in the order of all vectors.
 SOUGHT = ("yield_acceleration", "decay_rate", "delta_mu")
 
-#: In parts of a channel's largest value: the least noise that it is taken to have, the noise of a
-#: rough likelihood, and the standard deviation of an offset, drift or step: no bound, in effect.
-_LEAST_NOISE = 1e-5
-_ROUGH_NOISE = 0.1
+#: Standard deviation of an offset, drift or step, in parts of a channel's largest value: no bound,
+#: in effect.
 _LARGE = 3.0
+
+#: Combinations of errors with a smaller effect, in standard deviations, are left out.
+_NO_EFFECT = 0.01
+
+#: Standard deviations by which the sum of squares of errors of the table's motion exceeds what is
+#: expected where they are taken to be larger, and how many times as large they may be.
+_WIDER = 3.0
+_TIMES = np.geomspace(1.0, 20.0, 100)
+
+#: Samples at rest at least that show the noise of a sensor.
+_AT_REST = 20
+
+#: Standard deviation of normal noise over its median; standard deviations, and parts of a channel's
+#: largest value, beyond which a sample contradicts the solution.
+_OF_MEDIAN = 1.4826
+_NO_NOISE = 7.0
+_NO_MISFIT = 0.01
+
+#: Steps of the derivatives by errors of the table's motion, in standard deviations.
+_STEP = 0.3
 
 #: Intervals of sampling to either side of a jump that are left out; consecutive samples, and
 #: standard deviations of the noise, by which a block slips upslope.
 _BESIDE_A_JUMP = 1.6
 _UPSLOPE_SAMPLES = 4
 _UPSLOPE_NOISE = 5.0
-
-#: Degree of the table's spline, and most coefficients whose uncertainty is followed; each costs a
-#: solution.
-_DEGREE = 3
-_MOST_SHAPES = 150
-
-#: Samples for each coefficient that are tried, and by how many of these spacings the knots are
-#: closer than the criterion says: what a spline cannot follow is no noise, and enters no interval.
-_SPACINGS = (64, 48, 32, 24, 16, 12, 10, 8, 6, 5, 4, 3, 2)
-_FINER = 2
-
-#: Multiples of the noise beyond which the table moves, and samples before that where a kink is
-#: tried.
-_MOVES = 5.0
-_KINK_SAMPLES = 12
 
 
 class Line(NamedTuple):
@@ -73,51 +84,48 @@ class Line(NamedTuple):
 
 
 class Linear:
-    """Residuals of parameters and of nuisance parameters, on which what is computed depends linearly.
+    """Errors that residuals depend on linearly.
 
-    `computed` gives samples for parameters, in standard deviations, to be compared with those
-    `measured`; `effects` are those of one standard deviation of each nuisance parameter on them.
+    `effects` are those of one standard deviation of each.  Residuals are in standard deviations,
+    one a row of `effects`.
     """
 
-    def __init__(
-        self, computed: Callable[[Floats], Floats], measured: Floats, effects: Floats
-    ) -> None:
-        self.computed = computed
-        self.measured = measured
-        self.left, self.sizes, self.right = np.linalg.svd(effects, full_matrices=False)
+    def __init__(self, effects: Floats) -> None:
+        left, sizes, right = np.linalg.svd(effects, full_matrices=False)
+        matter = sizes > _NO_EFFECT
+        self.left = np.asarray(left[:, matter], order="F")
+        self.sizes = sizes[matter]
+        self.right = right[matter]
         self.known = self.sizes**2 / (1.0 + self.sizes**2)
         self._shrunk = self.left * (1.0 - 1.0 / np.sqrt(1.0 + self.sizes**2))
 
-    def __call__(self, parameters: Floats) -> Floats:
-        """Independent residuals of unit variance, if the model and the noise are right."""
-        rest = self._raw(parameters)
-        return np.asarray(rest - self._shrunk @ (self.left.T @ rest))
+    def independent(self, residuals: Floats) -> Floats:
+        """Return residuals made independent, of unit variance if model and noise are right."""
+        return np.asarray(residuals - self._shrunk @ (self.left.T @ residuals))
 
-    def _raw(self, parameters: Floats) -> Floats:
-        return np.nan_to_num(
-            self.measured - self.computed(parameters), nan=1e3, posinf=1e3, neginf=1e3
-        )
+    def most_likely(self, residuals: Floats) -> tuple[Floats, Floats]:
+        """Return the most likely values of the errors and their standard deviations.
 
-    def nuisances(self, parameters: Floats) -> tuple[Floats, Floats]:
-        """Most likely values of the nuisance parameters and their standard deviations, in those of their priors."""
-        along = self.left.T @ self._raw(parameters)
+        Both are in standard deviations of their priors.
+        """
+        along = self.left.T @ residuals
         values = self.right.T @ (self.sizes / (1.0 + self.sizes**2) * along)
         spread = 1.0 - np.sum(self.right**2 * self.known[:, None], axis=0)
         return np.asarray(values), np.sqrt(np.maximum(spread, 0.0))
-
-    def unexplained(self, parameters: Floats) -> Floats:
-        """What the most likely nuisance parameters leave."""
-        explained = (self.left * self.sizes) @ (self.right @ self.nuisances(parameters)[0])
-        return np.asarray(self._raw(parameters) - explained)
 
 
 class Observation:
     """A test and what is known of its sensors, checked, and the likelihood that it gives.
 
-    `channels` of the block have the noise `sensor_noise` as neighbouring samples scatter, or as
-    given.  `drifts` may drift: those given and `drifting`.  `lines` are offsets, drifts and steps,
-    those of the table first; `wrong` the most likely errors of the table's motion and its lines, in
-    standard deviations; `upslope` the times at which slips begin that are left out.  `forward` and
+    All functions take as `parameters` Üy, λ, Δμ and then the sizes of `table_lines`, an offset and
+    a drift of the table's sensor.  These are sought with the parameters: the block's motion does
+    not depend on them linearly.
+
+    `channels` of the block have the noise `sensor_noise` as neighbouring samples, or those at rest,
+    scatter, or as given; the fit estimates `noise`, and the correlations `colour` of neighbouring
+    residuals.  `drifts` may drift: those given and `drifting`.  `lines` are offsets, drifts and
+    steps of the block's channels. `table_factor` is how many times the noise of the table's record
+    its errors are.  `upslope` are the times at which slips begin that are left out.  `forward` and
     `linear` are the model and the likelihood near the last solution.
     """
 
@@ -156,54 +164,90 @@ class Observation:
         self._weights = np.array([_weights_of(values) for values in measured])
         self.largest = np.nanmax(np.abs(measured), axis=1)
         converters = [max(converter_noise(values), 1e-15) for values in measured]
-        self._least_noise = np.maximum(_LEAST_NOISE * self.largest, converters)
+        self._least_noise = np.maximum(LEAST_NOISE * self.largest, converters)
         self._given_noise = np.array([noise.get(name, np.nan) for name in self.channels])
         scatter = np.maximum([noise_of(values) for values in measured], self._least_noise)
+        self.motion = table_motion(test.times, test.channels[TABLE])
+        self.noise = np.where(np.isnan(self._given_noise), scatter, self._given_noise)
+        at_rest = measured[:, test.times < self.motion.begins]
+        if at_rest.shape[1] >= _AT_REST:  # slow noise is not seen in neighbouring samples
+            scatter = np.fmax(scatter, np.nanstd(at_rest, axis=1))
         self.sensor_noise = np.where(np.isnan(self._given_noise), scatter, self._given_noise)
-        self._noise = self.sensor_noise.copy()
+        self.colour = np.zeros(len(self.channels))
         self.lines: list[Line] = []
+        self.table_lines: list[Line] = []
         since = (test.times - test.times[0]) / (test.times[-1] - test.times[0])
         for name, values in test.channels.items():
-            size = _LARGE * float(np.nanmax(np.abs(values)))
+            size = 1.0 if name == TABLE else _LARGE * float(np.nanmax(np.abs(values)))
+            lines = self.table_lines if name == TABLE else self.lines
             if name in offsets or name in self.drifts:
-                self.lines.append(Line("offset", name, size, np.full(since.size, size)))
+                lines.append(Line("offset", name, size, np.full(since.size, size)))
             if name in self.drifts:
-                self.lines.append(Line("drift", name, size, size * since))
-        self.motion = table_motion(test.times, test.channels[TABLE])
-        self.peak = float(self.motion.acceleration.max())
-        of_table = [
-            np.interp(self.motion.times, test.times, one.values)
-            for one in self.lines
-            if one.channel == TABLE
+                lines.append(Line("drift", name, size, size * since))
+        columns = [
+            np.interp(self.motion.times, test.times, line.values) for line in self.table_lines
         ]
-        self._shapes = np.column_stack([self.motion.shapes, *(-line for line in of_table)])
-        self.wrong = np.zeros(self._shapes.shape[1])
+        self._table_lines = np.reshape(columns, (len(columns), self.motion.times.size)).T
+        # of a table that begins and ends at rest the mean acceleration is 0
+        mean = float(np.mean(test.channels[TABLE]))
+        self.first_sizes = np.array([mean, 0.0])[: len(self.table_lines)]
+        self.wrong = np.zeros(self.motion.errors.shape[1])
+        self.table_factor = 1.0
+        self._of_sensors = {name: np.zeros(test.times.size) for name in self.channels}
+        self.peak = self.peak_of(self.first_sizes)
         self.upslope: list[float] = []
 
-    def record(self, wrong: Floats | None = None) -> Record:
-        """The table's motion as last estimated, or with so many standard deviations of each of its errors."""
-        errors = self._shapes @ (self.wrong if wrong is None else wrong)
-        return Record(self.motion.times, self.motion.acceleration + errors)
+    def table_acceleration(self, sizes: Floats) -> Floats:
+        """Return the table's acceleration at the points of `motion`.
+
+        It is less offset and drift of these sizes.
+        """
+        return np.asarray(self.motion.with_errors(self.wrong) - self._table_lines @ sizes)
+
+    def recorded_acceleration(self, sizes: Floats) -> Floats:
+        """Return the table's acceleration at the points of `motion` by its own record alone.
+
+        It is less offset and drift of these sizes, and does not depend on the model.
+        """
+        return np.asarray(self.motion.acceleration - self._table_lines @ sizes)
+
+    def peak_of(self, sizes: Floats) -> float:
+        """Return the largest acceleration of the table, less offset and drift of these sizes."""
+        return float(np.max(self.recorded_acceleration(sizes)))
+
+    def record(self, sizes: Floats) -> Record:
+        """Return the table's motion, less offset and drift of these sizes."""
+        return Record(self.motion.times, self.table_acceleration(sizes))
 
     def _forward(self, wrong: Floats | None = None) -> Forward:
-        """The model's block on that motion of the table."""
-        record = self.record(wrong)
-        options = options_of(Problem(self.model, record, Cycle()), wants_peak=True)
-        path = path_of_record.__wrapped__(record, 1.0)  # tried once: not kept in its cache
+        """Return the model's block on the table's motion.
+
+        `wrong` are the standard deviations of each error of that motion.
+        """
+        motion = self.motion.with_errors(self.wrong if wrong is None else wrong)
+
+        @functools.lru_cache(maxsize=4)
+        def shaking_of(sizes: tuple[float, ...]) -> tuple[Any, Any]:
+            record = Record(self.motion.times, motion - self._table_lines @ np.array(sizes))
+            options = options_of(Problem(self.model, record, Cycle()), wants_peak=True)
+            return options, path_of_record.__wrapped__(record, 1.0)  # kept here, not in its cache
 
         def histories(parameters: Floats, times: Floats) -> dict[str, Floats]:
-            onset, decay, drop = map(float, parameters)
+            onset, decay, drop, *sizes = map(float, parameters)
             cell = Cell(
                 math.tan(math.radians(self.theta)), self.mu_s, 1.0, onset, decay, drop, math.nan
             )
             table = np.empty((len(HISTORY), times.size))
-            fill_history(cell, options, path, times, History(*table))
+            fill_history(cell, *shaking_of(tuple(sizes)), times, History(*table))
             return dict(zip(HISTORY, table, strict=True))
 
         return histories
 
-    def _weighted(self, series: Mapping[str, Floats]) -> Floats:
-        """The samples that count, channel by channel, in standard deviations; 0 of a channel that is not there."""
+    def _scaled(self, series: Mapping[str, Floats]) -> Floats:
+        """Return the samples that count, channel by channel, in standard deviations.
+
+        They are 0 of a channel that is not there.
+        """
         none = np.zeros(self.test.times.size)
         weighted: Floats = (
             np.array([series.get(name, none) for name in self.channels])[self._counted]
@@ -214,73 +258,204 @@ class Observation:
     def _by_channel(self, values: Floats) -> list[Floats]:
         return np.split(values, np.cumsum(self._counted.sum(axis=1))[:-1])
 
-    def linearize(self, parameters: Floats, rough: bool = False) -> None:
-        """Set `linear` near a solution; `rough` as if the table's record had no noise, and the channels had much."""
+    def linearize(self, parameters: Floats, rough: float = 0.0) -> None:
+        """Set `linear` near a solution.
+
+        If `rough`, the noise of each channel is at least this part of its largest value, and the
+        table's record has none.
+        """
         self.forward = self._forward()
-
-        def computed(parameters: Floats, by: Forward = self.forward) -> Floats:
-            return self._weighted(by(parameters, self.test.times))
-
         self._counted = self._use & ~self._beside_jumps
-        noise = np.maximum(self._noise, _ROUGH_NOISE * self.largest * rough)
+        noise = np.maximum(self.noise, rough * self.largest)
         self._scale = (self._weights / noise[:, None])[self._counted]
-        base = computed(parameters)
-        shapes = self.motion.shapes.shape[1]
-        moving = self.wrong.size
-        effects = np.zeros((base.size, shapes + len(self.lines)))
-        for at in range(shapes if rough else 0, moving):
+        apart = [distances(self.test.times[counted]) for counted in self._counted]
+        colours = [0.0 if rough else colour for colour in self.colour]
+        self._links = np.concatenate(
+            [colour**gaps for colour, gaps in zip(colours, apart, strict=True)]
+        )
+        at_rest = self._scaled(self.forward(parameters, self.test.times))
+        number = self.wrong.size
+        self._effects = np.zeros((at_rest.size, number + len(self.lines)))
+        for at in range(number if rough else 0, number):
             moved = self.wrong.copy()
-            moved[at] += (
-                0.3 if at < shapes else 1e-3
-            )  # steps of the derivatives, in standard deviations
-            change = computed(parameters, self._forward(moved)) - base
-            effects[:, at] = np.nan_to_num(change) / (moved[at] - self.wrong[at])
-        for at, line in enumerate(self.lines[moving - shapes :], moving):
-            effects[:, at] = self._weighted({line.channel: line.values})
-        measured = self._weighted(self.test.channels) + effects[:, :moving] @ self.wrong
-        self.linear = Linear(computed, measured, effects)
+            moved[at] += _STEP
+            history = self._forward(moved)(parameters, self.test.times)
+            self._effects[:, at] = np.nan_to_num(self._scaled(history) - at_rest) / _STEP
+        for at, line in enumerate(self.lines, number):
+            self._effects[:, at] = self._scaled({line.channel: line.values})
+        self._measured = self._scaled(self.test.channels) + self._effects[:, :number] @ self.wrong
+        self.linear = Linear(whitened(self._effects, self._links))
+
+    def residuals(self, parameters: Floats) -> Floats:
+        """Return independent residuals of unit variance, if the model and the noise are right."""
+        rest = self._rest(self.forward(parameters, self.test.times))
+        return self.linear.independent(whitened(rest, self._links))
+
+    def _rest(self, history: Mapping[str, Floats]) -> Floats:
+        """Return measured less computed samples that count, in standard deviations."""
+        rest = self._measured - self._scaled(history)
+        return np.nan_to_num(rest, nan=1e3, posinf=1e3, neginf=1e3)
+
+    def _without_lines(self, name: str) -> Floats:
+        """Return a channel of the block less what its offset, drift and steps add."""
+        return np.asarray(self.test.channels[name] - self._of_sensors[name])
+
+    def nuisances(self, parameters: Floats) -> tuple[Floats, Floats]:
+        """Return the most likely errors of the table's motion and sizes of `lines`.
+
+        The second array has their standard deviations.
+        """
+        rest = self._rest(self.forward(parameters, self.test.times))
+        return self.linear.most_likely(whitened(rest, self._links))
+
+    def likely_motion(self, parameters: Floats) -> Floats:
+        """Return the most likely errors of the table's motion, in standard deviations."""
+        return self.nuisances(parameters)[0][: self.wrong.size]
 
     def _unexplained(self, parameters: Floats) -> list[Floats]:
-        """What nothing explains of the samples of each channel, in its own unit."""
-        return self._by_channel(self.linear.unexplained(parameters) / self._scale)
+        """Return what nothing explains of the samples of each channel, in standard deviations."""
+        rest = self._rest(self.forward(parameters, self.test.times))
+        sizes = self.linear.most_likely(whitened(rest, self._links))[0]
+        return self._by_channel(rest - self._effects @ sizes)
 
     def misfits(self, parameters: Floats) -> list[float]:
-        """Root mean square of what nothing explains of each channel."""
-        return [float(np.sqrt(np.mean(rest**2))) for rest in self._unexplained(parameters)]
+        """Return the root mean square of what nothing explains of each channel."""
+        rests = zip(self._unexplained(parameters), self._by_channel(self._scale), strict=True)
+        return [float(np.sqrt(np.mean((rest / scale) ** 2))) for rest, scale in rests]
 
-    def cycle(self, begin: float, end: float, speed: float) -> Linear:
-        """The samples between two times; the motion at the beginning is unknown, velocities of the order of `speed`."""
-        whole = self.linear
+    def contradicting(self, parameters: Floats) -> dict[str, tuple[Floats, float]]:
+        """Return the times of samples that noise cannot explain, and how far off the farthest is.
+
+        The noise is measured by the median, so that these samples have no part in it.
+        """
+        rests = zip(self._unexplained(parameters), self._by_channel(self._scale), strict=True)
+        beyond = {}
+        for at, (rest, scale) in enumerate(rests):
+            times = self.test.times[self._counted[at]]
+            off = np.abs(rest / scale)
+            noise = _OF_MEDIAN * float(np.median(off))
+            contradicts = off > max(_NO_NOISE * noise, _NO_MISFIT * self.largest[at])
+            if contradicts.any():
+                beyond[self.channels[at]] = (times[contradicts], float(off.max()))
+        return beyond
+
+    def noise_seen(self, parameters: Floats) -> list[float]:
+        """Return the noise of each channel that does not rest on the model.
+
+        It is `sensor_noise`; or, if the residuals are noise of first order, their size.
+        """
+        rests = self._unexplained(parameters)
+        links = self._by_channel(self._links)
+        seen = []
+        for at, (rest, link) in enumerate(zip(rests, links, strict=True)):
+            coloured = self.colour[at] > 0.0 and is_first_order(whitened(rest, link))
+            size = max(self.sensor_noise[at], self.noise[at] * coloured)
+            seen.append(float(size if np.isnan(self._given_noise[at]) else self.sensor_noise[at]))
+        return seen
+
+    def cycle(
+        self, begin: float, end: float, speed: float, parameters: Floats, table_errors: Floats
+    ) -> Callable[[Floats], Floats]:
+        """Return the independent residuals of the samples between two times, near `parameters`.
+
+        The motion at the beginning is unknown, velocities of the order of `speed`; offset and drift
+        of the table have the standard errors `table_errors`.
+        """
         times = self.test.times
         rows = (self._counted & (times >= begin) & (times < end))[self._counted]
         still = np.full(times.size, speed)
         moved = speed * (times - begin)
-        place = self._weighted({"relative_displacement": still})
-        velocity = self._weighted({"relative_displacement": moved, "relative_velocity": still})
-        effects = np.column_stack([(whole.left * whole.sizes) @ whole.right, place, velocity])
-        return Linear(
-            lambda parameters: whole.computed(parameters)[rows], whole.measured[rows], effects[rows]
-        )
+        place = self._scaled({"relative_displacement": still})
+        velocity = self._scaled({"relative_displacement": moved, "relative_velocity": still})
 
-    def settle(self, parameters: Floats) -> None:
-        """Estimate the noise that is not given, take the table's motion as most likely, leave out samples at jumps."""
+        def rest(parameters: Floats) -> Floats:
+            return self._rest(self.forward(parameters, times))
+
+        shifts = []
+        for at, error in enumerate(table_errors, 3):
+            shifted = parameters.copy()
+            shifted[at] += _STEP * error
+            shifts.append((rest(parameters) - rest(shifted)) / _STEP)
+        effects = np.column_stack([self._effects, place, velocity, *shifts])
+        linear = Linear(whitened(effects, self._links)[rows])
+        return lambda parameters: linear.independent(whitened(rest(parameters), self._links)[rows])
+
+    def settle(self, parameters: Floats, others: Sequence[Floats] = ()) -> float:
+        """Estimate noise that is not given and its colour, and the table's motion.
+
+        Return the largest change of a noise, in parts of it, or of a correlation.
+        `others` are further parameters that may be right: samples beside jumps of the computed
+        acceleration count as such for all.
+        """
         leverage = self._by_channel(self.linear.left**2 @ self.linear.known)
         weights = self._by_channel(self._scale)
         rests = self._unexplained(parameters)
+        links = self._by_channel(self._links)
+        sizes = self.nuisances(parameters)[0]
+        noise = self.noise.copy()
+        colour = self.colour.copy()
         for at, (rest, part) in enumerate(zip(rests, leverage, strict=True)):
-            weight = weights[at] * self._noise[at]
+            weight = weights[at] * self.noise[at]
             freedom = float(np.sum(weight**2)) - float(np.sum(part)) - 1.0
+            square = float(np.sum(whitened(rest, links[at]) ** 2))
             if np.isnan(self._given_noise[at]) and freedom > 0.0:
-                self._noise[at] = max(
-                    np.sqrt(np.sum((rest * weight) ** 2) / freedom), self._least_noise[at]
+                self.noise[at] = max(
+                    self.noise[at] * np.sqrt(square / freedom), self._least_noise[at]
                 )
-        self.wrong = self.linear.nuisances(parameters)[0][: self.wrong.size]
+        self._estimate_colour(parameters)
+        self.wrong = sizes[: self.wrong.size]
+        self._widen_table_errors(parameters)
+        self._of_sensors = {name: np.zeros(self.test.times.size) for name in self.channels}
+        for line, size in zip(self.lines, sizes[self.wrong.size :], strict=True):
+            self._of_sensors[line.channel] += size * line.values
+        self.look_at_jumps([parameters, *others])
+        return float(
+            max(np.abs(self.noise / noise - 1.0).max(), np.abs(self.colour - colour).max())
+        )
+
+    def _estimate_colour(self, parameters: Floats) -> None:
+        """Set the colour of the noise; of one that is the least a channel can have it is not seen."""
+        rests = self._by_channel(self._rest(self.forward(parameters, self.test.times)))
+        effects = self._by_channel(self._effects)
+        for at, counted in enumerate(self._counted):
+            if self.noise[at] > self._least_noise[at]:
+                apart = distances(self.test.times[counted])
+                self.colour[at] = colour_of(rests[at], effects[at], apart)
+
+    def _widen_table_errors(self, parameters: Floats) -> None:
+        """Multiply the errors of the table's motion by how much larger the block shows them to be.
+
+        They are too small if the noise of the table's record is slower than it seems to be.
+        """
+        number = self.wrong.size
+        rest = whitened(self._rest(self.forward(parameters, self.test.times)), self._links)
+        values, deviations = self.linear.most_likely(rest)
+        known = float(np.sum(1.0 - deviations[:number] ** 2))
+        expected = known + _WIDER * (2.0 * known) ** 0.5
+        if self.table_factor == 1.0 and np.sum(values[:number] ** 2) < expected:
+            return
+        effects = whitened(self._effects, self._links)
+        of_sensors = np.linalg.qr(effects[:, number:])[0]
+        of_table = effects[:, :number] - of_sensors @ (of_sensors.T @ effects[:, :number])
+        left, sizes, _ = np.linalg.svd(of_table, full_matrices=False)
+        squares = (left.T @ rest) ** 2
+        # as first estimated, with noise that had not settled, they may be too large
+        factors = _TIMES / self.table_factor
+        variances = 1.0 + np.outer(factors**2, sizes**2)
+        factor = factors[np.argmin(np.sum(np.log(variances) + squares / variances, axis=1))]
+        self.table_factor *= float(factor)
+        self.motion = self.motion._replace(errors=factor * self.motion.errors)
+        self.wrong = self.wrong / factor
+
+    def look_at_jumps(self, solutions: Sequence[Floats]) -> None:
+        """Find the samples beside jumps of the block's acceleration, as computed for some parameters."""
         if "block_acceleration" in self.channels:
             row = self.channels.index("block_acceleration")
-            self._beside_jumps[row] = self._next_to_jumps(parameters, self._noise[row])
+            beside = [self._next_to_jumps(each, self.noise[row]) for each in solutions]
+            self._beside_jumps[row] = np.any(beside, axis=0)
 
     def _next_to_jumps(self, parameters: Floats, noise: float) -> NDArray[np.bool_]:
-        """Samples next to a jump of the block's computed acceleration: they tell on which side of it the jump lies."""
+        """Return which samples are next to a jump of the block's computed acceleration."""
         times = self.test.times
         fine = np.interp(np.arange(0, times.size - 1, 0.125), np.arange(times.size), times)
         history = self._forward()(parameters, fine)
@@ -291,31 +466,34 @@ class Observation:
         least = max(noise, 0.02 * float(np.abs(table).max()))
         before = np.diff(times, prepend=2 * times[0] - times[1])
         after = np.append(before[1:], before[-1])
-        found = np.zeros(times.size, dtype=bool)
+        beside = np.zeros(times.size, dtype=bool)
         for jump in fine[np.flatnonzero(change > least)]:
-            found |= (times > jump - _BESIDE_A_JUMP * after) & (
+            beside |= (times > jump - _BESIDE_A_JUMP * after) & (
                 times < jump + _BESIDE_A_JUMP * before
             )
-        return found
+        return beside
 
-    def leave_out_upslope_slips(self) -> None:
-        """Leave out the samples of slips upslope, after each of which the displacement may have stepped."""
+    def leave_out_upslope_slips(self, parameters: Floats) -> None:
+        """Leave out the samples of slips upslope, after each of which the displacement may step."""
         times = self.test.times
-        channels = self.test.channels
-        if self.channels == ("block_acceleration",):  # no velocity
+        if "relative_velocity" in self.channels:
+            velocity = self._without_lines("relative_velocity")
+        elif "relative_displacement" in self.channels:
+            velocity = np.gradient(self._without_lines("relative_displacement"), times)
+        else:
             return
-        velocity = channels.get("relative_velocity")
-        if velocity is None:
-            velocity = np.gradient(channels["relative_displacement"], times)
-        noise = max(noise_of(velocity), 2e-3 * float(np.nanmax(np.abs(velocity))))
+        off = np.abs(velocity - self.forward(parameters, times)["relative_velocity"])
+        largest = float(np.nanmax(np.abs(velocity)))
+        noise = max(noise_of(velocity), _OF_MEDIAN * float(np.nanmedian(off)), 2e-3 * largest)
         upslope = np.nan_to_num(velocity) < -_UPSLOPE_NOISE * noise
         several = ndimage.binary_opening(upslope, np.ones(_UPSLOPE_SAMPLES))
         slips = ndimage.binary_dilation(several, iterations=3)
         self._use = self._use & ~slips
         for slip in runs_of(slips):
             self.upslope.append(float(times[slip.start]))
-            if "relative_displacement" in channels:
-                size = _LARGE * float(np.nanmax(np.abs(channels["relative_displacement"])))
+            if "relative_displacement" in self.channels:
+                displacement = self.test.channels["relative_displacement"]
+                size = _LARGE * float(np.nanmax(np.abs(displacement)))
                 name = f"upslope slip at {times[slip.start]:.4g} s"
                 step = size * (times > times[slip.stop - 1])
                 self.lines.append(Line(name, "relative_displacement", size, step))
@@ -331,149 +509,6 @@ def _weights_of(values: Floats) -> Floats:
     return weights
 
 
-class TableMotion(NamedTuple):
-    """A table's motion (s and m/s², linear between its points) with its uncertainty.
-
-    `shapes` are independent errors that it may have, one a column, each of one standard deviation;
-    `noise` is the standard deviation of the noise of the record, m/s².
-    """
-
-    times: Floats
-    acceleration: Floats
-    shapes: Floats
-    noise: float
-
-
-class _Fitted(NamedTuple):
-    """A spline, Akaike's criterion for it, and the noise that it leaves."""
-
-    spline: BSpline
-    score: float
-    noise: float
-
-
-def converter_noise(values: Floats) -> float:
-    """The least noise of digitised values: errors of a converter repeat from cycle to cycle and average out less."""
-    steps = np.diff(np.unique(values[np.isfinite(values)]))
-    return (
-        1.6 * float(steps.min()) / 12.0**0.5 if steps.size else 0.0
-    )  # that of rounding, 1.6 times
-
-
 def runs_of(holds: NDArray[np.bool_]) -> list[slice]:
     """The runs of samples at which something holds."""
     return [part for (part,) in ndimage.find_objects(ndimage.label(holds)[0])]
-
-
-def table_motion(times: Floats, acceleration: Floats) -> TableMotion:
-    """The motion behind a record of a table's acceleration."""
-    fits = [
-        one
-        for spacing in _SPACINGS
-        if (one := _fitted(times, acceleration, _knots(times, spacing))) is not None
-    ]
-    chosen = min(range(len(fits)), key=lambda at: fits[at].score)
-    best, kinked = _with_kinks(times, acceleration, fits[min(chosen + _FINER, len(fits) - 1)])
-    knots = best.spline.t
-    bounds = np.unique(best.spline.t)
-    # 4 to 32 points between knots, so that straight lines between them are wrong by a tenth of the
-    # noise at most
-    curvature = np.abs(best.spline(times, nu=2)).max() * np.diff(bounds).max() ** 2 / 8.0
-    parts = np.sqrt(curvature / max(0.1 * best.noise, 1e-9 * float(np.abs(acceleration).max())))
-    parts = int(np.clip(np.ceil(parts), 4, 32))
-    fine = np.interp(
-        np.arange((bounds.size - 1) * parts + 1) / parts, np.arange(bounds.size), bounds
-    )
-    # of many coefficients only what is wrong over long times matters, which fewer can say
-    coarse = knots if knots.size <= _MOST_SHAPES else _knots(times, -(-times.size // _MOST_SHAPES))
-    design = BSpline.design_matrix(times, coarse, _DEGREE)
-    root = cholesky((design.T @ design).toarray() + 1e-9 * np.eye(design.shape[1]), lower=True)
-    shapes = solve_triangular(
-        root, BSpline.design_matrix(fine, coarse, _DEGREE).toarray().T, lower=True
-    ).T
-    noise = max(best.noise, converter_noise(acceleration))
-    smooth = np.asarray(best.spline(fine))
-    errors = [noise * shapes]
-    for fits in kinked:
-        # of a converter's noise only a part is seen as scatter
-        off, error = _averaged(fits, fine, (best.noise / noise) ** 2)
-        smooth = smooth + off
-        errors.append(error)
-    # chords of a curve lie on its hollow side: moved back by their mean distance, the integral is
-    # right; beside a kink the curve bends only over the shorter of two intervals, which may be much
-    # the shorter
-    width = np.minimum(np.diff(fine, prepend=-np.inf), np.diff(fine, append=np.inf))
-    smooth = smooth - width**2 / 12.0 * best.spline(fine, nu=2)
-    return TableMotion(fine, smooth, np.column_stack(errors), noise)
-
-
-def _fitted(times: Floats, values: Floats, knots: Floats) -> _Fitted | None:
-    """The spline on these knots; None where samples are too few for them."""
-    size = times.size
-    number = knots.size - _DEGREE - 1
-    if number + 2 >= size:
-        return None
-    try:
-        spline = make_lsq_spline(times, values, knots, _DEGREE)
-    except (ValueError, np.linalg.LinAlgError):  # an interval of knots without a sample
-        return None
-    square = max(float(np.sum((values - spline(times)) ** 2)), 1e-24 * float(np.sum(values**2)))
-    score = size * float(np.log(square / size)) + 2.0 * number * size / (size - number - 1.0)
-    return _Fitted(spline, score, float(np.sqrt(square / (size - number))))
-
-
-def _knots(times: Floats, spacing: int) -> Floats:
-    """Knots that have about so many samples between each other, however these are spaced."""
-    count = max(times.size // spacing, 1)
-    inner = np.interp(np.linspace(0, times.size - 1, count + 1), np.arange(times.size), times)
-    return np.concatenate([np.repeat(times[0], _DEGREE), inner, np.repeat(times[-1], _DEGREE)])
-
-
-def _with_kinks(
-    times: Floats, values: Floats, best: _Fitted
-) -> tuple[_Fitted, list[list[_Fitted]]]:
-    """The spline with a kink where the shaking begins, and one where it ends, if these improve it, as for a sine.
-
-    Beside it, for each kink, the splines with the kink at this and other places that are likely.
-    """
-    moving = np.flatnonzero(
-        np.abs(values) > _MOVES * max(noise_of(values), 1e-6 * float(np.abs(values).max()))
-    )
-    kinked: list[list[_Fitted]] = []
-    for end, side in ((0, -1.0), (-1, 1.0)) if moving.size else ():
-        places = moving[end] + side * 0.25 * np.arange(4 * _KINK_SAMPLES)
-        places = places[(places > 2) & (places < times.size - 3)]
-        knots = best.spline.t
-        tried = []
-        for at in np.interp(places, np.arange(times.size), times):
-            outside = (
-                (knots < at) & (knots > times[0])
-                if end == 0
-                else (knots > at) & (knots < times[-1])
-            )
-            for kept in (knots, knots[~outside]):  # at rest outside, one polynomial is enough
-                near = np.abs(kept - at) < 1e-9 * (times[-1] - times[0])
-                tried.append(
-                    _fitted(
-                        times,
-                        values,
-                        np.sort(np.concatenate([kept[~near], np.repeat(at, _DEGREE)])),
-                    )
-                )
-        found = [one for one in tried if one is not None]
-        top = min(found, key=lambda one: one.score, default=best)
-        if top.score < best.score:
-            best = top
-            kinked.append([one for one in found if one.score < top.score + 12.0])
-    return best, kinked
-
-
-def _averaged(fits: list[_Fitted], fine: Floats, part: float) -> tuple[Floats, Floats]:
-    """By what splines with a kink at several places, averaged by likelihood, differ from the best; errors of this."""
-    best = min(fits, key=lambda one: one.score)
-    likely = np.exp([0.5 * part * (best.score - one.score) for one in fits])
-    likely /= likely.sum()
-    apart = np.column_stack([one.spline(fine) - best.spline(fine) for one in fits])
-    middle = apart @ likely
-    left, sizes, _ = np.linalg.svd((apart - middle[:, None]) * np.sqrt(likely), full_matrices=False)
-    return middle, (left * sizes)[:, :3]
