@@ -27,10 +27,12 @@ WRITES = {
     "limits": ["limits.md"],
     "compiling": ["compiling.md"],
     "both_ways": ["both_ways.md"],
+    "strength": ["strength.md"],
+    "linearisation": ["linearisation.md", "linearisation.png"],
 }
 
 #: Half a minute of processes, clusters and compilation.
-SLOW = ("large_sweeps", "faults")
+SLOW = ("large_sweeps", "faults", "linearisation")
 
 
 @pytest.mark.filterwarnings("ignore")  # of the packages compared with

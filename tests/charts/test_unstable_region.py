@@ -14,10 +14,13 @@ from numpy.typing import NDArray
 
 import slipsweep
 from slipsweep.charts import maps, style
-from slipsweep.model.variables import SlidingMode
+from slipsweep.model.variables import SlidingMode, Validity
 from tests.support.charts import inside, named
 
 Floats = NDArray[np.float64]
+
+#: Flags that only blocks have whose strength changes.
+CHANGING = {Validity.MAY_NOT_STOP, Validity.NOT_AT_REST}
 
 #: Coarse along θ and μs: φ = arctan μs lies anywhere between two cells.
 THETAS = np.arange(0.0, 21.0, 2.0)
@@ -192,8 +195,10 @@ def test_every_flag_that_is_hatched_has_words_of_its_own() -> None:
 
 def test_hatches_differ_by_their_signs_and_are_closer_in_narrow_figures(lined: xr.Dataset) -> None:
     """Not by their density, which nobody sees in a small region or legend."""
-    signs = [hatch[0] for hatch in (*maps.HATCHES.values(), maps.UNSOUND_HATCH)]
-    assert len({*signs}) == len(signs)
+    newmarks = {Validity.STATICALLY_UNSTABLE, Validity.FLEXIBLE_BLOCK, *CHANGING}
+    for flags in (maps.HATCHES.keys() - CHANGING, newmarks):
+        signs = [maps.UNSOUND_HATCH[0], *(maps.HATCHES[flag][0] for flag in flags)]
+        assert len({*signs}) == len(signs)
     densities = [
         len(
             named(lined.slipsweep.chart("modes", at={"mu_s": 0.25}, width=width), gid)[0].hatches[0]

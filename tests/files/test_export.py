@@ -443,7 +443,7 @@ def test_flags_are_the_bits(folder: Path, chunks: dict[str, int] | None) -> None
         assert sorted(map(str, flags.data_vars)) == sorted(
             (flag.name or "").lower() for flag in Validity
         )
-        assert kinds == ["no value"] * 5 + ["caution"] * 4 + ["note"] * 2
+        assert kinds == ["no value"] * 6 + ["caution"] * 5 + ["note"] * 2
         assert flags.uplift.dims == data.validity.dims
         assert bool(flags.chunks) == (chunks is not None)  # lazy data stay lazy
         assert flags.statically_unstable.any()

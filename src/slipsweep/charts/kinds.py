@@ -27,7 +27,7 @@ from slipsweep.charts.style import Options
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.opening import values_text
 from slipsweep.files.selection import At, own_names
-from slipsweep.model.options import MODELS
+from slipsweep.model.options import MODELS, changing_strength
 from slipsweep.model.variables import PARAMETERS, Validity, has_signed_displacements
 
 Draw = Callable[[Result, Options], Figure]
@@ -67,6 +67,9 @@ SORTS: dict[str, tuple[str, tuple[Draw, ...]]] = {
 
 #: Flags that charts hatch and Newmark's block can raise.
 _NEWMARK_FLAGS = (Validity.STATICALLY_UNSTABLE, Validity.FLEXIBLE_BLOCK)
+
+#: Those that it raises only where its strength changes while it slides.
+_STRENGTH_FLAGS = (Validity.MAY_NOT_STOP, Validity.NOT_AT_REST)
 
 
 def kinds_of(sort: str) -> dict[str, Draw]:
@@ -197,6 +200,10 @@ def title_page(result: Result) -> Figure:
         if name in coords
     ]
     is_newmark = solved.is_newmark(result.data)
+    flags = [flag for flag in maps.HATCHES if flag not in _STRENGTH_FLAGS]
+    if is_newmark:
+        changes = changing_strength(MODELS.from_attributes(attributes)) is not None
+        flags = [*_NEWMARK_FLAGS, *(_STRENGTH_FLAGS if changes else ())]
     compared = [
         "one interface (μs 0.38), two shaking-table tests: θ 5 and 6°, 0.36 and 0.52 g, 1.8 and 3.5 Hz"
     ]
@@ -217,7 +224,7 @@ def title_page(result: Result) -> Figure:
             f"{style.FLAG_TEXT[flag]}: {style.flag_name(flag)} ({flag.kind}): {flag.text}"
             f"{left_out if flag in solved.LEFT_OUT else ''}"
             for flag in maps.HATCHES
-            if flag in _NEWMARK_FLAGS or not is_newmark
+            if flag in flags
         ]
     sections["Origin"] = [
         style.plain(result.name),

@@ -8,11 +8,20 @@ import numpy as np
 import xarray as xr
 
 from slipsweep.grid.tally import Tally
-from slipsweep.model.options import MODELS, SOLVERS, Mendez, Model, Newmark, slides_both_ways
+from slipsweep.model.options import (
+    MODELS,
+    SOLVERS,
+    Mendez,
+    Model,
+    Newmark,
+    changing_strength,
+    slides_both_ways,
+)
 from slipsweep.model.variables import (
     PARAMETERS,
     RECORD_INPUTS,
     SIGNED,
+    STRENGTH_INPUTS,
     STRENGTHS,
     VALUELESS,
     WAVEFORM_INPUTS,
@@ -97,7 +106,10 @@ def solve(
         block = ("yield_coefficient",)
     if slides_both_ways(chosen):
         block += ("theta", "upslope_yield_acceleration")
-    friction = ("decay_rate", "delta_mu", "minimum_friction") if isinstance(chosen, Mendez) else ()
+    friction: tuple[str, ...] = ()
+    if isinstance(chosen, Mendez):
+        friction = ("decay_rate", "delta_mu", "minimum_friction")
+    friction += STRENGTH_INPUTS.get(changing_strength(chosen) or "", ())
     wanted = (*block, *friction, *WAVEFORM_INPUTS, *RECORD_INPUTS[1:])
     given = {name: _bare(data[name]) for name in wanted if name in data.coords} | changed
     if given.get("displacement_amplitude") is not None:

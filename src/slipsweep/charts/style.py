@@ -72,6 +72,11 @@ SYMBOLS = {
     "decay_rate": "λ",
     "delta_mu": "Δμ",
     "minimum_friction": "μmin",
+    "residual_mu": "μr",
+    "residual_phi": "φr",
+    "weakening_distance": "D",
+    "fast_mu": "μf",
+    "rate_constant": "a",
     "structure_frequency": "fs",
     "yield_coefficient": "ky",
     "upslope_yield_acceleration": "Üy,up",
@@ -102,6 +107,8 @@ FLAG_TEXT = {
     Validity.FLEXIBLE_BLOCK: "block is not rigid",
     Validity.UPSLOPE: "ends upslope",
     Validity.NEAR_MODE_LIMIT: "near the mode limit",
+    Validity.MAY_NOT_STOP: "may not stop",
+    Validity.NOT_AT_REST: "does not stop",
 }
 
 #: Other words of legends.
@@ -313,6 +320,8 @@ _WORDS: dict[Any, str] = {
     "literal": "literal rise",
     "eq12": "recoupling by Eq. 12",
     "integrate": "recoupling by integration",
+    "weakening": "friction falls with slip",
+    "rate": "friction depends on velocity",
 }
 
 

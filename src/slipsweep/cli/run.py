@@ -13,7 +13,7 @@ from slipsweep.cli.options import Large
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files import outputs
 from slipsweep.model import variables
-from slipsweep.model.options import SOLVERS
+from slipsweep.model.options import solver_for
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -98,7 +98,7 @@ def run(
     if (
         solver is not None and solver != checked.solver.name
     ):  # the same one keeps the options of the sweep file
-        checked = replace(checked, solver=SOLVERS.of(solver))
+        checked = replace(checked, solver=solver_for(checked.model, solver))
     name = output or checked.output.path
     if name is None and spec.is_stream(sweep):
         raise InputError(

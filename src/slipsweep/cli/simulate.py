@@ -45,6 +45,21 @@ class Typed:
     minimum_friction: Annotated[float | None, BLOCK("Minimum friction μmin (default: Eq. 9).")] = (
         None
     )
+    residual_mu: Annotated[
+        float | None, RARE("Residual friction coefficient, with --strength weakening.")
+    ] = None
+    residual_phi: Annotated[
+        Text, RARE("Residual friction angle instead: 9 (degrees).", "VALUE")
+    ] = None
+    weakening_distance: Annotated[
+        Text, RARE("Slip from peak to residual friction: 50mm, 0.05 (m).", "VALUE")
+    ] = None
+    fast_mu: Annotated[
+        float | None, RARE("Friction coefficient at high velocity, with --strength rate.")
+    ] = None
+    rate_constant: Annotated[
+        Text, RARE("How fast it is approached with the velocity, s/m.", "VALUE")
+    ] = None
     structure_frequency: Annotated[
         Text, RARE("Natural frequency of the structure, Hz: flag flexible_block.", "VALUE")
     ] = None

@@ -11,7 +11,7 @@ from slipsweep.explore.excerpt import Excerpt, evenly, thinned_lengths
 from slipsweep.grid import engine, plans, solvers
 from slipsweep.grid.inputs import Inputs, Problem
 from slipsweep.kernels.history import History
-from slipsweep.model.options import MODELS, Cycle
+from slipsweep.model.options import MODELS, Cycle, changing_strength
 from slipsweep.model.variables import VALUELESS
 from slipsweep.motion.cutting import path_of_waveform
 from slipsweep.motion.waveforms import WAVEFORMS
@@ -47,11 +47,13 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
 
     They depend on time through the phase only: v(f) = V/ω and u(f) = W/ω², so that one history
     serves all frequencies and the page scales it (MODEL, motion rules).  None where the shaking is
-    not periodic or ends with a ramp beyond the cycles shown, where inputs are uncertain, or where
-    not even one history fits.
+    not periodic or ends with a ramp beyond the cycles shown, where inputs are uncertain, where the
+    strength changes while the block slides (no scaling then), or where not even one history fits.
     """
     table = excerpt.table
     if "waveform" not in table.attrs or "permanent_displacement" not in table:
+        return None
+    if changing_strength(MODELS.from_attributes(table.attrs)) is not None:
         return None
     motion = WAVEFORMS.from_attributes(table.attrs)
     if motion.cycles > CYCLES and motion.ramp_out > 0.0:

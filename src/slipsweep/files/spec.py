@@ -38,6 +38,11 @@ _MODEL_PARAMETERS = (
     "decay_rate",
     "delta_mu",
     "minimum_friction",
+    "residual_mu",
+    "residual_phi",
+    "weakening_distance",
+    "fast_mu",
+    "rate_constant",
     "structure_frequency",
 )
 
@@ -279,7 +284,9 @@ def parse(
             motion = _chosen(WAVEFORMS, tables["excitation"])
         sampling = _sampling(tables["uncertainty"], model.g) if "uncertainty" in content else None
         labels = tuple(str(row.get("label", number)) for number, row in enumerate(rows, 1))
-        solver = _chosen(options.SOLVERS, tables["solver"])
+        chosen = _chosen(options.SOLVERS, tables["solver"])
+        is_default = tables["solver"].get("method", "auto") == "auto"
+        solver = options.solver_for(model, "auto" if is_default else chosen)
         output = _output(tables["output"], sampling is not None)
         return SweepSpec(
             source, text, Inputs(**given), labels, model, motion, solver, output, sampling, files

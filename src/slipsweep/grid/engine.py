@@ -20,8 +20,9 @@ from slipsweep.grid import solvers, threads
 from slipsweep.grid.chunks import Chunk, grid_chunks, sizes_within, variables_within
 from slipsweep.grid.inputs import Problem
 from slipsweep.kernels.block import UNSOLVED, Cell
+from slipsweep.kernels.step import STRENGTH_FIELDS
 from slipsweep.model import variables as known
-from slipsweep.model.options import slides_both_ways
+from slipsweep.model.options import changing_strength, slides_both_ways
 from slipsweep.model.parameters import number_text
 from slipsweep.motion.intensity import strength_factor
 from slipsweep.motion.records import Record
@@ -164,10 +165,11 @@ def motions(request: Request) -> Iterator[tuple[Chunk, Request]]:
 
 
 def cell_inputs(problem: Problem, inputs: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the given fields of `Cell`, of variables or arrays that broadcast.
+    """Return the given fields of a cell, of variables or arrays that broadcast.
 
     Under a record A is its factor.  A block that slides both ways also has its upslope yield
-    acceleration.
+    acceleration, one whose strength changes the parameters of that and the seconds in a unit of
+    phase.
     """
     given = dict(inputs)
     if isinstance(problem.excitation, Record) or "displacement_amplitude" in inputs:
@@ -177,6 +179,9 @@ def cell_inputs(problem: Problem, inputs: Mapping[str, Any]) -> dict[str, Any]:
     if "theta" in inputs:
         given["tan_theta"] = np.tan(np.radians(inputs["theta"]))
     fields = {name: given[name] for name in Cell._fields if name in given}
+    if changing_strength(problem.model) is not None:
+        fields |= {name: given[name] for name in STRENGTH_FIELDS if name in given}
+        fields["seconds"] = phase_seconds(problem, inputs)
     if slides_both_ways(problem.model):
         fields["upslope_yield_acceleration"] = upslope_yield_acceleration(given, problem.model.g)
     return fields
@@ -224,6 +229,8 @@ def _scaled_dimension(request: Request) -> str | None:
     in_time = {"frequency", "time_scale", "structure_frequency"}
     if {"displacement_amplitude", "pgv", "arias_intensity"} & request.inputs.keys():
         in_time = {"structure_frequency"}  # the frequency is in the amplitude, too
+    if changing_strength(request.problem.model) is not None:
+        in_time = {"structure_frequency"}  # slip and velocity have lengths and times of their own
     others = {
         dim for name, one in request.inputs.items() if name not in in_time for dim in one.dims
     }

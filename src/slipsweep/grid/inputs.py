@@ -11,7 +11,15 @@ import xarray as xr
 from slipsweep.errors import InputError
 from slipsweep.model import parameters
 from slipsweep.model import variables as known
-from slipsweep.model.options import MODELS, SOLVERS, Model, Newmark, Solver, slides_both_ways
+from slipsweep.model.options import (
+    MODELS,
+    Model,
+    Newmark,
+    Solver,
+    changing_strength,
+    slides_both_ways,
+    solver_for,
+)
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform, peak_acceleration
@@ -31,7 +39,8 @@ class Problem:
 def check_problem(excitation: Any, model: Any, solver: Any) -> Problem:
     """What is to be solved, and how; each is an object, or the name of one with its defaults."""
     motion = excitation if isinstance(excitation, (Record, Suite)) else WAVEFORMS.of(excitation)
-    return Problem(MODELS.of(model), motion, SOLVERS.of(solver))
+    chosen = MODELS.of(model)
+    return Problem(chosen, motion, solver_for(chosen, solver))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,6 +75,11 @@ class Inputs:
     decay_rate: Any = None
     delta_mu: Any = None
     minimum_friction: Any = None
+    residual_mu: Any = None
+    residual_phi: Any = None
+    weakening_distance: Any = None
+    fast_mu: Any = None
+    rate_constant: Any = None
     structure_frequency: Any = None
 
     @property
@@ -134,6 +148,7 @@ def _refuse_others(motion: Waveform | Record | Suite, given: Mapping[str, Any]) 
 
 def _check_interface(model: Model, given: Mapping[str, Any]) -> None:
     """Refuse an interface that is not known, or known twice."""
+    _check_strength(model, given)
     both = slides_both_ways(model)
     if "upslope_yield_acceleration" in given and not both:
         raise InputError(
@@ -157,6 +172,33 @@ def _check_interface(model: Model, given: Mapping[str, Any]) -> None:
     for name in known.INTERFACE_INPUTS:
         if name in given and not (both and name == "theta"):
             raise InputError(f"{name}: not allowed beside yield_coefficient, which replaces it")
+
+
+def _check_strength(model: Model, given: Mapping[str, Any]) -> None:
+    """Refuse a changing strength that is not given as a whole, or that the model does not have."""
+    chosen = changing_strength(model)
+    for strength, names in known.STRENGTH_INPUTS.items():
+        angles = [angle for angle, name in known.ANGLES.items() if name in names]
+        for name in (*names, *angles):
+            if strength != chosen and name in given:
+                raise InputError(f"{name}: only with model = Newmark(strength={strength!r})")
+    if chosen is None:
+        return
+    if "residual_mu" in given and "residual_phi" in given:
+        raise InputError(
+            "residual_phi, residual_mu: must not both be given; residual_mu = tan(residual_phi)"
+        )
+    replaced = ("residual_mu",) if "residual_phi" in given else ()
+    needed = [name for name in known.STRENGTH_INPUTS[chosen] if name not in replaced]
+    for name in needed:
+        if name not in given:
+            raise InputError(f"{name}: must be given with strength = {chosen!r}")
+    for name in ("yield_acceleration", "yield_coefficient", "upslope_yield_acceleration"):
+        if name in given:
+            raise InputError(
+                f"{name}: not allowed with strength = {chosen!r}, which follows from theta and "
+                "friction; for a yield coefficient give theta = 0 and mu_s"
+            )
 
 
 def _polarity(given: Any) -> xr.Variable:
@@ -210,7 +252,7 @@ def _check_moving(motion: Record | Suite, coords: Mapping[str, xr.Variable], str
 def checked(given: Mapping[str, Any], g: float) -> dict[str, xr.Variable]:
     """Every parameter as a float64 array with named dimensions, within its bounds, described.
 
-    `g` is what "g" as the unit of an array stands for.  With `phi` there is its tangent, `mu_s`.
+    `g` is what "g" as the unit of an array stands for.  With an angle there is its tangent, too.
     """
     checked = {}
     for name, one in given.items():
@@ -230,9 +272,10 @@ def checked(given: Mapping[str, Any], g: float) -> dict[str, xr.Variable]:
         if values.size == 0:
             raise InputError(f"{name} = []: must hold at least one value")
         checked[name] = xr.Variable(dims, values, attrs)
-        if name == "phi":
-            checked["mu_s"] = xr.Variable(
-                dims, parameters.friction_coefficient(values), known.PARAMETERS["mu_s"]
+        if name in known.ANGLES:
+            tangent = known.ANGLES[name]
+            checked[tangent] = xr.Variable(
+                dims, parameters.friction_coefficient(values), known.PARAMETERS[tangent]
             )
     return checked
 
@@ -253,7 +296,9 @@ def grid_sizes(variables: Mapping[str, xr.Variable]) -> dict[str, int]:
 def inputs_of(problem: Problem, coords: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:
     """The coordinates that cells are solved for: no friction angle; of a motion its place in the suite, and no more."""
     own = {
-        name: one for name, one in coords.items() if name not in ("phi", *known.MOTION_COORDINATES)
+        name: one
+        for name, one in coords.items()
+        if name not in (*known.ANGLES, *known.MOTION_COORDINATES)
     }
     suite = problem.excitation
     if not isinstance(suite, Suite):

@@ -199,7 +199,10 @@ def plan_sweep(
     ):
         tasks.append(_task(engine.solve, problem, motion, solved))
     if "newmark_displacement" in wanted:
-        classical = replace(problem, model=options.Newmark(g=problem.model.g))
+        constant = options.Newmark(g=problem.model.g)
+        is_changing = options.changing_strength(problem.model) is not None
+        solver_of_constant = options.Cycle() if is_changing else problem.solver
+        classical = replace(problem, model=constant, solver=solver_of_constant)
         tasks.append(_task(engine.solve, classical, ("newmark_displacement",), solved))
     cost = cost_of(problem) * max(len(tasks), 1)
     # one that was given is a coordinate already
@@ -317,6 +320,8 @@ def _about(problem: grid_inputs.Problem, given: Collection[str]) -> dict[str, An
     if options.slides_both_ways(problem.model):
         is_given = "upslope_yield_acceleration" in given
         sources += f"; Üy,up {'given' if is_given else 'by statics, from Üy and θ'}"
+    if changing := options.changing_strength(problem.model):
+        sources += f"; {options.STRENGTH_TEXT[changing]}"
     inputs = {"friction_inputs": sources}
     return {
         "title": title,

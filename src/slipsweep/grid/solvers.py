@@ -8,12 +8,19 @@ import numpy as np
 
 from slipsweep.grid.inputs import Problem
 from slipsweep.kernels import block as physics
-from slipsweep.kernels import history, newmark, newmark_record, step
+from slipsweep.kernels import history, newmark, newmark_record, step, strength
 from slipsweep.kernels.grid import CELL, find_parameters
 from slipsweep.kernels.newmark_history import fill_newmark_history
 from slipsweep.kernels.sine.solve import solve_sine
 from slipsweep.kernels.walk import solve_walk, workspace_of
-from slipsweep.model.options import Mendez, Newmark, Step, slides_both_ways
+from slipsweep.model.options import (
+    Mendez,
+    Model,
+    Newmark,
+    Step,
+    changing_strength,
+    slides_both_ways,
+)
 from slipsweep.model.variables import FRICTION_PARAMETERS
 from slipsweep.motion import cutting
 from slipsweep.motion.paths import Path
@@ -193,13 +200,22 @@ def stepper_of(
     on_piece = math.ceil(count / STEPS_PER_SAMPLE) if is_record else 0
     path = path_under(problem.excitation, polarity)
     steps = step.steps_of(path, rule, count, on_piece)
+    take_steps = stepping_kernel(problem.model)
 
     def solve(cells: np.ndarray, log: np.ndarray, results: np.ndarray) -> Any:
         blocks = step.blocks_of(rule, count, on_piece)
-        step.solve_steps(cells, options, path, blocks, steps, log, results)
+        take_steps(cells, options, path, blocks, steps, log, results)
         return blocks[0]
 
     return solve
+
+
+def stepping_kernel(model: Model) -> Callable[..., Any]:
+    """Return the kernel that takes steps, by how the strength of the block changes."""
+    changing = changing_strength(model)
+    if changing == "weakening":
+        return strength.solve_weakening
+    return strength.solve_rate if changing == "rate" else step.solve_steps
 
 
 def is_plain_sine(motion: Any) -> bool:

@@ -34,13 +34,15 @@ NOT_RECOUPLED = int(Validity.NOT_RECOUPLED)
 UPSLOPE = int(Validity.UPSLOPE)
 NEAR_MODE_LIMIT = int(Validity.NEAR_MODE_LIMIT)
 FRICTION_ESTIMATED = int(Validity.FRICTION_ESTIMATED)
+MAY_NOT_STOP = int(Validity.MAY_NOT_STOP)
+NOT_AT_REST = int(Validity.NOT_AT_REST)
 
 #: Not a flag of results: an event was not found (`events`), and the engine raises an error.
 UNSOLVED = 1 << 14
 NO_VALUE = int(VALUELESS) | UNSOLVED
 
 #: Cautions and notes of the motion, which a block without a value has not.
-OF_A_VALUE = YIELD_GOVERNS | NOT_RECOUPLED | NEAR_MODE_LIMIT | FRICTION_ESTIMATED
+OF_A_VALUE = YIELD_GOVERNS | NOT_RECOUPLED | NEAR_MODE_LIMIT | FRICTION_ESTIMATED | MAY_NOT_STOP
 
 
 class Cell(NamedTuple):

@@ -65,20 +65,34 @@ UP = 7  # Newmark's block, V < 0: Ü = −Üy,up
 class Law(NamedTuple):
     """A friction law μ(block, Üg, v, s).
 
-    v is the relative velocity in m/s, s = ∫|v|dt the slip in m.  `knows_motion` says whether μ
-    depends on v or s.  Newmark's block keeps its yield acceleration, or (`is_strength`) has that of
-    Coulomb with μ.
+    v is the relative velocity in m/s (of Newmark's block the speed in the direction in which it
+    slides), s = ∫|v|dt the slip in m.  `knows_motion` says whether μ
+    depends on v or s, `knows_slip` whether on s.  Newmark's block keeps its yield acceleration, or
+    (`is_strength`) has that of Coulomb with μ.  `longest_step`, of the block and the rate of V, is
+    the longest step that resolves the law (`unlimited`, if the default steps do).
     """
 
     friction: Callable[..., float]
     knows_motion: bool
+    knows_slip: bool
     is_strength: bool
+    longest_step: Callable[..., float]
 
+
+#: Parameters of strength that changes while the block slides (`kernels.strength`).
+STRENGTH_FIELDS = ("residual_mu", "weakening_distance", "fast_mu", "rate_constant")
 
 #: The cells that are stepped: a `Cell`, the yield acceleration upslope (NaN, if the block slides
-#: downslope only), and the seconds in a unit of phase.
+#: downslope only), the seconds in a unit of phase, and the parameters of its strength (NaN, if it is
+#: of another kind).
 STEP_CELL = np.dtype(
-    (np.record, [(name, "f8") for name in (*Cell._fields, "upslope_yield_acceleration", "seconds")])
+    (
+        np.record,
+        [
+            (name, "f8")
+            for name in (*Cell._fields, "upslope_yield_acceleration", "seconds", *STRENGTH_FIELDS)
+        ],
+    )
 )
 
 #: A block: its parameters, how it is stepped, and its motion up to now.
@@ -93,6 +107,12 @@ BLOCK = np.dtype(
             ("decay_rate", "f8"),
             ("yield_acceleration", "f8"),
             ("upslope_yield_acceleration", "f8"),
+            ("slides_up", "i8"),  # in both directions
+            ("residual_mu", "f8"),
+            ("weakening_distance", "f8"),
+            ("fast_mu", "f8"),
+            ("rate_constant", "f8"),
+            ("weakens_until", "f8"),  # ∫|V| from which on the law does not depend on it
             ("g", "f8"),
             ("seconds", "f8"),  # in a unit of phase
             ("mode", "i8"),  # `SlidingMode`; under a record that of the pulse
@@ -177,6 +197,9 @@ SHORTEST_STEP = 1e-14
 ROUNDING = 1e-12
 LEAST_ROUNDING = 4e-16
 
+#: Yield acceleration upslope, m/s², where no acceleration moves the block that way.
+LOCKED = 1e9
+
 #: Points of a rise at which Eq. 4 is compared with Üy (`yield_governs`).
 POINTS_OF_RISE = 32
 
@@ -185,6 +208,12 @@ POINTS_OF_RISE = 32
 def exponential_friction(block: Block, ground: float, velocity: float, slip: float) -> float:
     """Eq. 6, the friction law of the paper, which does not depend on the motion."""
     return eq.friction_coefficient(ground, block.mu_s, block.delta_mu, block.decay_rate, block.g)
+
+
+@registered
+def unlimited(block: Block, first_rate: float) -> float:
+    """Longest step for laws that the default steps resolve."""
+    return math.inf
 
 
 # ------------------------------------------------------------------ one step
@@ -206,16 +235,26 @@ def eq4_rate(law: Law, block: Block, ground: float, velocity: float, slip: float
 
 
 @inlined
+def resistance(law: Law, block: Block, up: bool, velocity: float, slip: float) -> float:
+    """|Ü| of Newmark's block that slides: its yield acceleration, or that of Coulomb with μ.
+
+    μ is that at the speed in the direction of the slide, which a step may carry a little below 0.
+    """
+    if not law.is_strength:
+        return block.upslope_yield_acceleration if up else block.yield_acceleration
+    friction = friction_at(law, block, 0.0, -velocity if up else velocity, slip)
+    if up and friction * block.tan_theta >= 1.0:
+        return LOCKED
+    tan_theta = -block.tan_theta if up else block.tan_theta
+    return eq.coulomb_yield_acceleration(friction, tan_theta, block.g)
+
+
+@inlined
 def newmark_rate(law: Law, block: Block, ground: float, velocity: float, slip: float) -> float:
-    """Üg − Ü of Newmark's block, with Ü its yield acceleration or that of Coulomb with μ."""
+    """Üg − Ü of Newmark's block."""
     up = block.phase == UP
-    if law.is_strength:
-        friction = friction_at(law, block, ground, velocity, slip)
-        tan_theta = -block.tan_theta if up else block.tan_theta
-        resistance = eq.coulomb_yield_acceleration(friction, tan_theta, block.g)
-    else:
-        resistance = block.upslope_yield_acceleration if up else block.yield_acceleration
-    return ground + resistance if up else ground - resistance
+    braking = resistance(law, block, up, velocity, slip)
+    return ground + braking if up else ground - braking
 
 
 @inlined
@@ -346,6 +385,15 @@ def velocity_in_step(block: Block, step: Step, part: float) -> float:
     return block.velocity + gained + bend
 
 
+@inlined
+def displacement_in_step(block: Block, step: Step, part: float) -> float:
+    """W gained in a part of a step: the integral of `velocity_in_step`."""
+    gained = step.gained * part**3 * (1.0 - 0.5 * part)
+    early = step.first_rate * part**2 * (0.5 - part * (2.0 / 3.0 - 0.25 * part))
+    late = step.last_rate * part**3 * (1.0 / 3.0 - 0.25 * part)
+    return step.h * (block.velocity * part + gained + step.h * (early - late))
+
+
 @scalar
 def eq4_in_step(
     law: Law, block: Block, base: Base, p: int, tau: float, step: Step, part: float
@@ -376,13 +424,22 @@ def falls(block: Block, step: Step) -> bool:
 
 
 @inlined
+def passes_kink(block: Block, step: Step) -> bool:
+    """Return whether the slip from which on the law does not depend on it lies in a step."""
+    return block.slip < block.weakens_until <= block.slip + abs(step.moved)
+
+
+@inlined
 def may_end(law: Law, block: Block, rises: bool, step: Step) -> bool:
     """Return whether the phase may end in a step, or V be largest or least in it.
 
     A phase ends where V changes its sign.  While Üg rises b is no longer held where Eq. 4 exceeds
-    it, and with the monotone rise it no longer follows Eq. 4 where that falls.
+    it, and with the monotone rise it no longer follows Eq. 4 where that falls.  A law of the slip
+    has a kink where it no longer depends on it.
     """
     if opposite(step.first_rate, step.last_rate):
+        return True
+    if law.knows_slip and passes_kink(block, step):
         return True
     if block.phase == CONTINUOUS:
         return False
@@ -425,6 +482,22 @@ def part_to_stop(block: Block, step: Step) -> float:
     while low < 0.5 * (low + high) < high:
         part = 0.5 * (low + high)
         if side * velocity_in_step(block, step, part) < 0.0:
+            high = part
+        else:
+            low = part
+    return high
+
+
+@scalar
+def part_to_kink(block: Block, step: Step) -> float:
+    """Return the part of a step after which the law depends on the slip no more; infinity, if none."""
+    if not passes_kink(block, step):
+        return math.inf
+    low = 0.0
+    high = 1.0
+    while low < 0.5 * (low + high) < high:
+        part = 0.5 * (low + high)
+        if block.slip + abs(displacement_in_step(block, step, part)) >= block.weakens_until:
             high = part
         else:
             low = part
@@ -510,18 +583,43 @@ def end_positive_half_wave(block: Block) -> None:
 
 
 @scalar
-def wait_for_yield(block: Block, base: Base, p: int, tau: float) -> float:
+def place_beyond(block: Block, base: Base, p: int, level: float, rises: bool) -> float:
+    """Return τ at which Üg passes a level that it has passed at the end of piece p."""
+    piece = base.pieces[p]
+    first = block.amplitude * piece.first
+    if first >= level if rises else first <= level:
+        return piece.begin
+    low = piece.begin
+    high = piece.finish
+    while low < 0.5 * (low + high) < high:
+        middle = 0.5 * (low + high)
+        ground = ground_at(block, base, p, middle)
+        if ground >= level if rises else ground <= level:
+            high = middle
+        else:
+            low = middle
+    return high
+
+
+@scalar
+def wait_for_yield(law: Law, block: Block, base: Base, p: int, tau: float) -> float:
     """Return τ at which Newmark's block at rest begins to slide: where Üg exceeds what it resists."""
     piece = base.pieces[p]
-    down = piece.top > 0.0
-    limit = block.yield_acceleration if down else block.upslope_yield_acceleration
-    if block.amplitude * abs(piece.top) <= limit:
+    down = resistance(law, block, False, 0.0, block.slip)
+    up = resistance(law, block, True, 0.0, block.slip) if block.slides_up else math.inf
+    block.yield_acceleration = down
+    ground = ground_at(block, base, p, tau)
+    last = block.amplitude * piece.last
+    if ground > down or ground < -up:
+        begin_slide(block, base, p, tau, DOWN if ground > down else UP)
+    elif last > down:
+        tau = max(tau, place_beyond(block, base, p, down, True))
+        begin_slide(block, base, p, tau, DOWN)
+    elif last < -up:
+        tau = max(tau, place_beyond(block, base, p, -up, False))
+        begin_slide(block, base, p, tau, UP)
+    else:
         return piece.finish
-    if abs(piece.last) > abs(piece.first):
-        tau = max(tau, place_of(block, base, p, limit))
-    elif abs(ground_at(block, base, p, tau)) <= limit:
-        return piece.finish
-    begin_slide(block, base, p, tau, DOWN if down else UP)
     return tau
 
 
@@ -561,7 +659,7 @@ def wait_for_eq4(law: Law, block: Block, base: Base, p: int, tau: float, end: fl
 def wait(law: Law, block: Block, base: Base, p: int, rises: bool, tau: float, end: float) -> float:
     """Return τ at which a block at rest begins to slide, or up to which it does not."""
     if block.rise == NEWMARK:
-        return wait_for_yield(block, base, p, tau)
+        return wait_for_yield(law, block, base, p, tau)
     if rises and block.in_pulse:
         return wait_for_eq4(law, block, base, p, tau, end)
     return base.pieces[p].finish
@@ -626,7 +724,8 @@ def take(block: Block, step: Step) -> None:
     block.velocity += step.gained
     block.displacement += step.moved
     block.slip += abs(step.moved)
-    block.largest_velocity = max(block.largest_velocity, block.velocity)
+    if block.phase != UP:
+        block.largest_velocity = max(block.largest_velocity, block.velocity)
     block.least_velocity = min(block.least_velocity, block.velocity)
     if block.phase == FOLLOWS:
         block.held = step.ground[2] - step.last_rate  # b = Ü
@@ -651,6 +750,8 @@ def take_whole_steps(
     for taken in range(steps):
         end = block.amplitude * points[each * (taken + 1)]
         middle = block.amplitude * points[2 * taken + 1] if each == 2 else 0.5 * (start + end)
+        if law.knows_motion and law.longest_step(block, first_rate) < h:
+            return taken, first_rate
         step = advance(law, block, (start, middle, end), h, first_rate)
         if may_end(law, block, rises, step):
             return taken, first_rate
@@ -691,7 +792,8 @@ def take_step(
         change = part_to_exceed(law, block, base, p, tau, step)
     elif rises and block.phase == FOLLOWS and block.rise == MONOTONE:
         change = part_to_fall(law, block, base, p, tau, step)
-    part = min(stop, change)
+    kink = part_to_kink(block, step) if law.knows_slip else math.inf
+    part = min(stop, change, kink)
     if part <= 1.0:
         stays = step.gained >= 0.0 if block.phase == UP else step.gained <= 0.0
         if block.velocity == 0.0 and stays:
@@ -707,8 +809,11 @@ def take_step(
     take(block, step)
     if part > 1.0:
         return h, step.last_rate
-    if stop <= change:
+    if stop <= part:
         rest(block)
+    elif kink <= part:
+        block.slip = block.weakens_until
+        return step.h, step.last_rate
     else:
         block.phase = FOLLOWS if block.phase == HELD else HELD
     return step.h, math.nan
@@ -751,6 +856,8 @@ def step_along(
             first_rate = rate_at(law, block, ground_at(block, base, p, tau))
         since = block.zero + tau - block.onset
         longest = max(GROWTH_SHARE * block.growth, TIME_SHARE * since) / block.steps
+        if law.knows_motion:
+            longest = min(longest, law.longest_step(block, first_rate))
         is_whole = j < last and tau == piece.begin + j * whole and longest >= whole
         if is_whole and log.size == 0:
             taken, first_rate = take_whole_steps(
@@ -905,7 +1012,9 @@ def walk(
         highest = block.amplitude * max(piece.first, piece.last)
         comes = piece.top > 0.0 and is_pulse and not block.in_pulse
         if comes and highest >= block.yield_acceleration:
-            reaches = place_of(block, base, p, block.yield_acceleration) if rises else piece.begin
+            reaches = piece.begin
+            if rises and not law.is_strength:
+                reaches = place_of(block, base, p, block.yield_acceleration)
         block.zero = offset + piece.start - piece.begin
         points = steps.wave[steps.first[p] : steps.first[p + 1]]
         tau = piece.begin
@@ -927,12 +1036,65 @@ def walk(
 
 
 @scalar
-def run_out(block: Block, log: np.ndarray, time: float) -> None:
-    """After the shaking Eq. 12 takes V to 0, but that of continuous sliding under a waveform."""
+def slide_freely(law: Law, block: Block, log: np.ndarray, time: float) -> None:
+    """After the shaking the strength of Newmark's block takes V to 0, or never does.
+
+    Steps are those that the law takes, at first 64/N of the time to the stop with the strength at
+    the end of the shaking, later 16/N of the time since; from where the strength is constant on, one
+    step is all.
+    """
+    side = -1.0 if block.phase == UP else 1.0
+    still = (0.0, 0.0, 0.0)
+    first_rate = rate(law, block, 0.0, block.velocity, block.slip)
+    shortest = GROWTH_SHARE / block.steps * abs(block.velocity / first_rate)
+    start = time
+    while block.phase != STUCK:
+        is_constant = law.knows_slip and block.slip >= block.weakens_until
+        if side * first_rate >= 0.0 and (is_constant or not law.knows_slip):
+            block.validity |= flags.NOT_AT_REST
+            return
+        if is_constant:
+            block.held = -side * first_rate
+            block.phase = ATTENUATES
+            attenuate(block, log, time, math.inf)
+            return
+        longest = max(shortest, TIME_SHARE / block.steps * (time - start))
+        h = max(min(longest, law.longest_step(block, first_rate)), SHORTEST_STEP)
+        step = advance(law, block, still, h, first_rate)
+        stop = part_to_stop(block, step)
+        kink = part_to_kink(block, step) if law.knows_slip else math.inf
+        part = min(stop, kink)
+        if part <= 1.0:
+            step = advance(law, block, still, h * part, first_rate)
+        if log.size > 0:
+            note(block, log, time, step)
+        take(block, step)
+        time += step.h
+        first_rate = step.last_rate
+        # it may stop where the strength that is left is just what holds it
+        creeps = block.slip + abs(step.moved) == block.slip
+        if creeps or (stop <= 1.0 and stop <= kink):
+            rest(block)
+        elif kink <= 1.0:
+            block.slip = block.weakens_until
+
+
+@scalar
+def run_out(law: Law, block: Block, log: np.ndarray, time: float) -> None:
+    """After the shaking Eq. 12 takes V to 0, but that of continuous sliding under a waveform.
+
+    A block that is at rest then, but too weak to stay there, has no value, either.
+    """
     end_positive_half_wave(block)
-    if block.phase == STUCK or block.validity & NO_VALUE != 0:
+    if block.validity & NO_VALUE != 0:
         return
-    if block.phase == CONTINUOUS and block.steps_on_piece == 0:
+    if law.is_strength and block.rise == NEWMARK:
+        if block.phase != STUCK:
+            slide_freely(law, block, log, time)
+        if block.phase == STUCK and resistance(law, block, False, 0.0, block.slip) < 0.0:
+            block.validity |= flags.NOT_AT_REST
+        return
+    if block.phase == STUCK or (block.phase == CONTINUOUS and block.steps_on_piece == 0):
         return
     if block.phase == DOWN:
         block.held = block.yield_acceleration
@@ -962,6 +1124,7 @@ class Cycle(NamedTuple):
     farthest: float
     nearest: float
     never_rests: bool
+    weakens: bool
 
 
 @scalar
@@ -969,9 +1132,10 @@ def repetitions(block: Block, cycle: Cycle, left: int) -> int:
     """Return how often the next cycles of that shape, at most `left`, gain what `cycle` did.
 
     They do so if they begin in the same state; and also with a larger V, if friction does not depend
-    on the motion and the block does not come to rest: then V is larger throughout by as much.
+    on the motion and the block does not come to rest: then V is larger throughout by as much.  A
+    block that weakens with the slip is never in the same state.
     """
-    if block.phase != cycle.phase or block.held != cycle.held:
+    if block.phase != cycle.phase or block.held != cycle.held or cycle.weakens:
         return 0
     faster = cycle.phase == CONTINUOUS or block.velocity >= cycle.velocity
     if cycle.never_rests and faster:
@@ -1014,6 +1178,7 @@ def walk_cycle(
     held = block.held
     velocity = block.velocity
     displacement = block.displacement
+    weakens = block.slip < block.weakens_until
     largest_velocity = block.largest_velocity
     largest_displacement = block.largest_displacement
     smallest_displacement = block.smallest_displacement
@@ -1033,6 +1198,7 @@ def walk_cycle(
         block.largest_displacement - displacement,
         block.smallest_displacement - displacement,
         not law.knows_motion and (phase == CONTINUOUS or block.least_velocity > 0.0),
+        weakens,
     )
     block.largest_velocity = max(block.largest_velocity, largest_velocity)
     block.largest_displacement = max(block.largest_displacement, largest_displacement)
@@ -1051,7 +1217,7 @@ def walk_cycles(
     log: np.ndarray,
 ) -> None:
     """Go through all cycles; those that gain what the last one did are not walked again."""
-    walked = Cycle(-1, -1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False)
+    walked = Cycle(-1, -1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False, False)
     n = 0
     for c in range(path.cycles.size - 1):
         left = path.repeats if path.repeats > 0 and c == path.lead else 1
@@ -1089,12 +1255,21 @@ def validity_before(block: Block, cell: np.record, options: Options, path: Path)
 
 
 @scalar
-def put_at_rest(block: Block, cell: np.record, options: Options) -> None:
+def put_at_rest(law: Law, block: Block, cell: np.record, options: Options) -> None:
     """Set what is given of a cell, and a block that has not moved."""
     block.amplitude = cell.amplitude
     block.tan_theta = cell.tan_theta
     block.mu_s = cell.mu_s
     block.upslope_yield_acceleration = flags.given_or(cell.upslope_yield_acceleration, math.inf)
+    block.slides_up = 0 if math.isnan(cell.upslope_yield_acceleration) else 1
+    block.residual_mu = cell.residual_mu
+    block.weakening_distance = cell.weakening_distance
+    block.fast_mu = cell.fast_mu
+    block.rate_constant = cell.rate_constant
+    block.weakens_until = 0.0
+    if law.knows_slip:
+        distance = flags.given_or(cell.weakening_distance, math.inf)
+        block.weakens_until = distance / (cell.seconds * cell.seconds)
     block.g = options.g
     block.seconds = cell.seconds
     block.rise = options.rise
@@ -1126,7 +1301,7 @@ def solve_cell(
     result: np.ndarray,
 ) -> None:
     """Step a cell through the shaking and on to rest; `result` is (`RESULTS`,)."""
-    put_at_rest(block, cell, options)
+    put_at_rest(law, block, cell, options)
     block.validity = validity_before(block, cell, options, path)
     mode = block.mode
     peak = block.amplitude * max(path.highest, -path.lowest)
@@ -1135,13 +1310,15 @@ def solve_cell(
     if slides_up and mode == eq.STUCK:
         mode = eq.STICK_SLIP
     if block.validity & NO_VALUE == 0 and slides:
+        if block.residual_mu <= block.tan_theta or block.fast_mu <= block.tan_theta:
+            block.validity |= flags.MAY_NOT_STOP
         if block.steps_on_piece == 0 and yield_governs_wave(law, block, path.base):
             block.validity = flags.without_estimates(block.validity | flags.YIELD_GOVERNS)
         walk_cycles(law, block, cell, options, path, steps, log)
         end = path.base.pieces[path.base.pieces.size - 1].end
-        run_out(block, log, end + 2.0 * math.pi * max(path.repeats - 1, 0))
+        run_out(law, block, log, end + 2.0 * math.pi * max(path.repeats - 1, 0))
     validity = flags.settled(block.validity, block.displacement, peak)
-    if block.upslope_yield_acceleration < math.inf:
+    if block.slides_up:
         validity &= ~flags.UPSLOPE  # no caution for a block that slides both ways
     if validity & NO_VALUE:
         result[:] = -1.0
@@ -1192,7 +1369,7 @@ def solve_steps(
     `cells` are of dtype `STEP_CELL`; `blocks`, (1,), says how they are stepped (`blocks_of`); `log`
     is of dtype `LOG`, empty if no history is asked for; `results` is (`RESULTS`, cells).
     """
-    law = Law(exponential_friction, False, False)
+    law = Law(exponential_friction, False, False, False, unlimited)
     solve_cells(law, cells, options, path, blocks, steps, log, results)
 
 

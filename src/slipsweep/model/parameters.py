@@ -32,6 +32,10 @@ GRAVITY = 9.81
 #: More than any shaking has, or any accuracy needs; the kernels count in 64 bits.
 MOST_CYCLES = MOST_POINTS = 1_000_000_000
 
+#: Largest rate constant of friction, s/m: friction is the fast one from micrometres a second on, and
+#: steps are as short as that takes.
+FASTEST_RATE = 1e5
+
 #: Longest ramp in cycles, each of which has pieces of its own.
 MOST_RAMP = 100
 
@@ -62,6 +66,8 @@ _FINITE, _NOT_NEGATIVE, _POSITIVE = (_from(low, LARGEST) for low in (-LARGEST, 0
 BOUNDS: dict[str, Bound] = {
     "theta": Bound(0.0, _BELOW_90, "0 <= theta < 90 degrees"),
     "phi": Bound(_ABOVE_0, _BELOW_90, "0 < phi < 90 degrees"),
+    "residual_phi": Bound(_ABOVE_0, _BELOW_90, "0 < residual_phi < 90 degrees"),
+    "rate_constant": _from(0.0, FASTEST_RATE),
     "azimuth": Bound(0.0, 360.0, "0 <= azimuth <= 360 degrees"),
     "quantile": Bound(_ABOVE_0, _BELOW_1, "a number between 0 and 1"),
     **dict.fromkeys(("ramp_in", "ramp_out"), Bound(0.0, MOST_RAMP, f"0 to {MOST_RAMP}")),
@@ -71,6 +77,7 @@ BOUNDS: dict[str, Bound] = {
     ),
     **dict.fromkeys(("amplitude", "displacement_amplitude"), _NOT_NEGATIVE),
     **dict.fromkeys(("mu_s", "minimum_friction", "scale", "time_scale", "displacement"), _POSITIVE),
+    **dict.fromkeys(("residual_mu", "weakening_distance", "fast_mu"), _POSITIVE),
     **dict.fromkeys(
         (
             "frequency",

@@ -138,6 +138,18 @@ class Validity(IntFlag):
         FlagKind.NOTE,
         "the displacement depends on lambda by Eq. 6 or delta_mu by Eqs. 10, 11",
     )
+    MAY_NOT_STOP = (
+        2048,
+        FlagKind.CAUTION,
+        (
+            "residual_mu or fast_mu <= tan(theta): once it slides, the block may not stop under its own weight"
+        ),
+    )
+    NOT_AT_REST = (
+        4096,
+        FlagKind.NO_VALUE,
+        "the block slides on under its own weight after the shaking and does not come to rest",
+    )
 
 
 def flags_of(kind: FlagKind) -> Validity:
@@ -146,6 +158,9 @@ def flags_of(kind: FlagKind) -> Validity:
 
 
 VALUELESS, CAUTIONS, NOTES = (flags_of(kind) for kind in FlagKind)
+
+#: Flags of blocks without a value that slide for good: their displacement exceeds every length.
+ENDLESS = Validity.STATICALLY_UNSTABLE | Validity.NOT_AT_REST
 
 
 class _Status(IntEnum):
@@ -241,6 +256,11 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "decay_rate": _cf("1", "friction decay with loading rate"),
     "delta_mu": _cf("1", "friction above static"),
     "minimum_friction": _cf("1", "minimum friction coefficient"),
+    "residual_mu": _cf("1", "residual friction coefficient"),
+    "residual_phi": _cf("degree", "residual friction angle of the interface"),
+    "weakening_distance": _cf("m", "slip over which friction falls to its residual value"),
+    "fast_mu": _cf("1", "friction coefficient at high velocity"),
+    "rate_constant": _cf("s m-1", "rate by which friction depends on velocity"),
     "structure_frequency": _cf("Hz", "natural frequency of the structure"),
     "scale": _cf("1", "scale factor of the recorded acceleration"),
     "pgv": _cf("m s-1", "peak ground velocity that motions are scaled to"),
@@ -248,6 +268,15 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "time_scale": _cf("1", "factor on the time of the record"),
     "polarity": _cf("1", "sign that the recorded acceleration is taken with"),
     "azimuth": _cf("degree", "downslope direction, from the first component to the second"),
+}
+
+#: Friction angles, each with the friction coefficient that it stands for.
+ANGLES = {"phi": "mu_s", "residual_phi": "residual_mu"}
+
+#: Inputs of Newmark's block whose strength changes while it slides.
+STRENGTH_INPUTS = {
+    "weakening": ("residual_mu", "weakening_distance"),
+    "rate": ("fast_mu", "rate_constant"),
 }
 
 #: Dimensions of a result, in order; further ones follow.
@@ -262,6 +291,11 @@ INTERFACE_INPUTS = (
     "decay_rate",
     "delta_mu",
     "minimum_friction",
+    "residual_mu",
+    "residual_phi",
+    "weakening_distance",
+    "fast_mu",
+    "rate_constant",
 )
 
 #: Inputs that the shaking has if it is a waveform, and if it is a record.

@@ -4,14 +4,15 @@ A block that slides both ways may come back to where it began.  What it needs ro
 largest |u|.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slipsweep.model.options import Model, slides_both_ways
-from slipsweep.model.variables import EXTREMES
+from slipsweep.model.options import Model, changing_strength, slides_both_ways
+from slipsweep.model.variables import EXTREMES, Validity
 
 #: What results say of a block that slides both ways.
 LARGEST = "largest displacement over time, downslope or upslope"
@@ -19,15 +20,23 @@ LARGEST = "largest displacement over time, downslope or upslope"
 
 def results_of(model: Model) -> tuple[str, ...]:
     """Return the names of the results that the displacement follows from."""
-    return tuple(EXTREMES) if slides_both_ways(model) else ("permanent_displacement",)
+    names = tuple(EXTREMES) if slides_both_ways(model) else ("permanent_displacement",)
+    return names if changing_strength(model) is None else (*names, "validity")
 
 
 def displacement_of(results: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
-    """Return the displacement that limits are set on, m, from these results."""
-    if "largest_displacement" not in results:
-        return results["permanent_displacement"]
-    upslope = -results["smallest_displacement"]
-    return np.asarray(np.maximum(results["largest_displacement"], upslope))
+    """Return the displacement that limits are set on, m, from these results.
+
+    It is infinite where the block does not come to rest.
+    """
+    if "largest_displacement" in results:
+        upslope = -results["smallest_displacement"]
+        moved = np.asarray(np.maximum(results["largest_displacement"], upslope))
+    else:
+        moved = results["permanent_displacement"]
+    if "validity" not in results:
+        return moved
+    return np.where(results["validity"] & Validity.NOT_AT_REST.value, math.inf, moved)
 
 
 def attributes_of(model: Model) -> dict[str, str]:

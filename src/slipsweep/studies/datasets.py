@@ -72,6 +72,11 @@ def sweep(
     decay_rate: Values | None = None,
     delta_mu: Values | None = None,
     minimum_friction: Values | None = None,
+    residual_mu: Values | None = None,
+    residual_phi: Values | None = None,
+    weakening_distance: Values | None = None,
+    fast_mu: Values | None = None,
+    rate_constant: Values | None = None,
     structure_frequency: Values | None = None,
     variables: Sequence[str] | None = None,
     chunks: Any = None,
@@ -103,7 +108,8 @@ def sweep(
     model : Mendez, Newmark or str
         The paper's friction law, or the classical rigid block; "mendez", "newmark".
     solver : Cycle, Step or str
-        Event by event, exact to rounding, or time stepping; "auto" takes "cycle".
+        Event by event, exact to rounding, or time stepping; "auto" takes "cycle", but for a block
+        whose strength changes ``Step("simpson", 512)``.
     displacement_amplitude : float, array or DataArray
         Peak ground displacement d, m, instead of `amplitude`: A = (2πf)² d.  The result has A as a
         coordinate, except if d and `frequency` span a grid: there it is a result, for `variables`.
@@ -131,6 +137,12 @@ def sweep(
     decay_rate, delta_mu, minimum_friction : float, array or DataArray, optional
         λ, Δμ and μmin where they are known; each replaces its estimate (Eqs. 6, 9-11), which under
         a record every pulse has from its own peak.
+    residual_mu, residual_phi, weakening_distance : float, array or DataArray, optional
+        Of ``Newmark(strength="weakening")``: residual friction coefficient, or in its place the
+        angle (degrees), and the slip over which friction falls from `mu_s` to it, m.
+    fast_mu, rate_constant : float, array or DataArray, optional
+        Of ``Newmark(strength="rate")``: friction coefficient at high velocity, and how fast it is
+        approached, s/m.
     structure_frequency : float, array or DataArray, optional
         Natural frequency of the sliding structure, Hz, for the `flexible_block` flag; not with a
         record.
@@ -207,6 +219,11 @@ def sweep(
         decay_rate=decay_rate,
         delta_mu=delta_mu,
         minimum_friction=minimum_friction,
+        residual_mu=residual_mu,
+        residual_phi=residual_phi,
+        weakening_distance=weakening_distance,
+        fast_mu=fast_mu,
+        rate_constant=rate_constant,
         structure_frequency=structure_frequency,
     )
     plan = plan_sweep(

@@ -53,6 +53,11 @@ def simulate(
     decay_rate: float | None = None,
     delta_mu: float | None = None,
     minimum_friction: float | None = None,
+    residual_mu: float | None = None,
+    residual_phi: float | None = None,
+    weakening_distance: float | None = None,
+    fast_mu: float | None = None,
+    rate_constant: float | None = None,
     structure_frequency: float | None = None,
 ) -> xr.Dataset:
     """Time history of one block: event by event, so that the samples are exact, or by steps.
@@ -119,6 +124,11 @@ def simulate(
         decay_rate=decay_rate,
         delta_mu=delta_mu,
         minimum_friction=minimum_friction,
+        residual_mu=residual_mu,
+        residual_phi=residual_phi,
+        weakening_distance=weakening_distance,
+        fast_mu=fast_mu,
+        rate_constant=rate_constant,
         structure_frequency=structure_frequency,
     )
     problem = grid_inputs.check_problem(excitation, model, solver)
@@ -191,8 +201,8 @@ class _History:
             table[1:] = math.nan
         return table
 
-    def _step(self, phases: Floats, table: Floats) -> None:
-        """Fill in a history by steps."""
+    def _logged(self) -> np.ndarray:
+        """Return the steps that are taken, of dtype `step.LOG`."""
         polarity = 1.0 if self.record is None else float(self.inputs["polarity"])
         stepper = solvers.stepper_of(self.problem, self.options, polarity)
         cells = np.full((1, len(step.STEP_CELL.names or ())), math.nan).view(step.STEP_CELL)[:, 0]
@@ -203,6 +213,11 @@ class _History:
         counted = _interruptible(stepper, cells, np.empty(1, step.LOG), results)
         log = np.empty(int(counted["logged"]), step.LOG)
         _interruptible(stepper, cells, log, results)
+        return log
+
+    def _step(self, phases: Floats, table: Floats) -> None:
+        """Fill in a history by steps."""
+        log = self._logged()
         table[0] = self.fields["amplitude"] * values_at(self.path, phases)
         table[1], table[3], table[4] = step.samples_of(log, phases, table[0])
         table[2] = eq.mobilised_friction(
@@ -285,6 +300,11 @@ class _History:
             else step * np.arange(count, dtype=np.float64)
         )
         after = 0.0
+        if options.changing_strength(self.problem.model) is not None and not self.valueless:
+            log = self._logged()
+            end = log["time"][-1] + log["step"][-1] if log.size else 0.0
+            after = max(float(end - shaken[-1]), 0.0)
+            return self._points_to(shaken, after, step, most)
         stick_slip = variables.SlidingMode.STICK_SLIP
         if not self.valueless and self.summary.get("sliding_mode", stick_slip) == stick_slip:
             ground, block, _, velocity, _ = self.sampled(shaken[-1:])[:, 0]
@@ -296,6 +316,10 @@ class _History:
                 "the block slides on after the shaking for more cycles than double precision holds; give times, or a "
                 "larger yield_acceleration"
             )
+        return self._points_to(shaken, after, step, most)
+
+    def _points_to(self, shaken: Floats, after: float, step: float, most: int) -> Floats:
+        """Phases of the shaking, and on to the end of the slide."""
         # a slide that brakes by 1e-7 m/s² lasts for months: under a constant deceleration few
         # points are enough
         beyond = math.ceil(min(after, most * step) / step)

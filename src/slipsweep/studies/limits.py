@@ -76,6 +76,11 @@ def limit_amplitude(
     decay_rate: Values | None = None,
     delta_mu: Values | None = None,
     minimum_friction: Values | None = None,
+    residual_mu: Values | None = None,
+    residual_phi: Values | None = None,
+    weakening_distance: Values | None = None,
+    fast_mu: Values | None = None,
+    rate_constant: Values | None = None,
     structure_frequency: Values | None = None,
     maximum_amplitude: float | None = None,
     amplitude_steps: int = AMPLITUDE_STEPS,
@@ -154,6 +159,11 @@ def limit_amplitude(
         decay_rate=decay_rate,
         delta_mu=delta_mu,
         minimum_friction=minimum_friction,
+        residual_mu=residual_mu,
+        residual_phi=residual_phi,
+        weakening_distance=weakening_distance,
+        fast_mu=fast_mu,
+        rate_constant=rate_constant,
         structure_frequency=structure_frequency,
     )
     plan = plan_limits(
@@ -280,11 +290,13 @@ def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> dict[
         results[name][cell] = values
     below = criterion.displacement_of(before)
     above = criterion.displacement_of(after)
-    jumps = above - below > JUMP * above
+    with np.errstate(invalid="ignore"):
+        jumps = (above - below > JUMP * above) | np.isinf(above)  # it does not come to rest
     modes = [
         name for name in ("sliding_mode", "stick_slip_pulses", "continuous_pulses") if name in after
     ]
     other_mode = np.any([before[name] != after[name] for name in modes], axis=0)
+    other_mode &= np.isfinite(above)
     results["limit_status"][cell] = np.select(
         [np.isnan(below), jumps & other_mode, jumps],
         [LimitStatus.AFTER_GAP, LimitStatus.AT_MODE_JUMP, LimitStatus.AT_JUMP],

@@ -187,6 +187,7 @@ def plan_strength(
 ) -> "StrengthPlan":
     """Return the plan of `required_strength`; same parameters and errors."""
     of = parameters.check_choice("of", of, variables.REQUIRED_STRENGTHS)
+    options.check_constant_strength("a required strength", options.MODELS.of(model))
     problem = grid_inputs.check_problem(excitation, model, "cycle")
     if not isinstance(problem.model, options.Newmark):
         raise InputError(

@@ -92,6 +92,11 @@ def sample(
     decay_rate: datasets.Values | None = None,
     delta_mu: datasets.Values | None = None,
     minimum_friction: datasets.Values | None = None,
+    residual_mu: datasets.Values | None = None,
+    residual_phi: datasets.Values | None = None,
+    weakening_distance: datasets.Values | None = None,
+    fast_mu: datasets.Values | None = None,
+    rate_constant: datasets.Values | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> xr.Dataset:
     """Quantiles and exceedance probabilities of the permanent displacement under uncertain inputs.
@@ -143,8 +148,9 @@ def sample(
 
         - `displacement_quantile` (m), dimension `quantile`, `mean_displacement` (m) and `exceedance_probability`,
           dimension `threshold` (m): P(u > threshold).  They are of the samples that have a value;
-          NaN where none has. Statically unstable samples have no value, and are counted as
-          exceeding every threshold.  Of a block that slides both ways they are of |u|.
+          NaN where none has. Statically unstable samples, and those that do not come to rest after
+          the shaking, have no value, and are counted as exceeding every threshold.  Of a block that
+          slides both ways they are of |u|.
         - `mode_share` (not under a record), dimension `mode`, `flag_share`, dimension `flag`, and `valueless_share`: of
           all samples, how many slide in which mode, have which flag, and have no value.  They do
           not depend on the frequency (of a record: the time scale) and have no such dimension (but
@@ -202,6 +208,11 @@ def sample(
         decay_rate=decay_rate,
         delta_mu=delta_mu,
         minimum_friction=minimum_friction,
+        residual_mu=residual_mu,
+        residual_phi=residual_phi,
+        weakening_distance=weakening_distance,
+        fast_mu=fast_mu,
+        rate_constant=rate_constant,
     )
     sampling = Sampling(
         uncertain,
@@ -234,7 +245,8 @@ def plan_samples(
     plan = plans.plan_sweep(
         planned, excitation=excitation, model=model, solver=solver, variables=wanted
     )
-    dropped = {*absolute, *(["mu_s"] if "phi" in drawn else [])}
+    tangents = [name for angle, name in variables.ANGLES.items() if angle in drawn]
+    dropped = {*absolute, *tangents}
     if (
         "displacement_amplitude" in plan.coords
         and {"displacement_amplitude", "frequency"} & dropped
@@ -306,8 +318,9 @@ class SamplePlan(plans.Plan):
         self.names = tuple(self.results)
         clock = "frequency" if is_wave else "time_scale"
         inputs = self.inputs = grid_inputs.inputs_of(problem, coords)
-        if "phi" in coords and "phi" in drawn:
-            inputs["phi"] = coords["phi"]
+        for angle in variables.ANGLES:
+            if angle in coords and angle in drawn:
+                inputs[angle] = coords[angle]
         if "displacement_amplitude" in {*inputs, *drawn}:
             inputs.pop("amplitude", None)  # A = ω²d
         sizes = grid_inputs.grid_sizes(inputs)
@@ -322,10 +335,12 @@ class SamplePlan(plans.Plan):
                 clock in coords and dim in coords[clock].dims
             ):  # the samples of a grid point serve all its frequencies
                 raise InputError(f"{key}: must not be a dimension of {clock}")
-        # strengths that change with the time, and f + offset, depend on the frequency itself: no
-        # scaling law then
-        unscaled = {"displacement_amplitude", "pgv", "arias_intensity"} & {*coords, *drawn} or (
-            clock in drawn and drawn[clock].kind == "offset"
+        # strengths that change with the time, f + offset, and friction that changes while the block
+        # slides depend on the frequency itself: no scaling law then
+        unscaled = (
+            bool({"displacement_amplitude", "pgv", "arias_intensity"} & {*coords, *drawn})
+            or (clock in drawn and drawn[clock].kind == "offset")
+            or options.changing_strength(problem.model) is not None
         )
         own = grid_inputs.grid_sizes(
             {name: one for name, one in inputs.items() if name != clock or unscaled}
@@ -441,9 +456,9 @@ class SamplePlan(plans.Plan):
         def reduce(point: int) -> None:
             values = np.sort(displacement[point])
             values = values[: np.searchsorted(values, np.nan)]  # NaN goes last
-            # these slide without any shaking: their displacement has no value and exceeds every
-            # threshold
-            unstable = np.count_nonzero(flags[point] & variables.Validity.STATICALLY_UNSTABLE.value)
+            # these slide without any shaking, or do not stop after it: their displacement has no
+            # value and exceeds every threshold
+            unstable = np.count_nonzero(flags[point] & variables.ENDLESS.value)
             if values.size + unstable:
                 above = values.size - np.searchsorted(
                     values, sampling.thresholds * squares[point], side="right"
@@ -487,8 +502,9 @@ class SamplePlan(plans.Plan):
         for name, one in self.sampling.distributions.items():
             if name in inputs or one.kind == "absolute":
                 inputs[name] = one.applied(inputs.get(name), drawn.pop(name))
-        if "phi" in inputs:
-            inputs["mu_s"] = parameters.friction_coefficient(inputs.pop("phi"))
+        for angle, name in variables.ANGLES.items():
+            if angle in inputs:
+                inputs[name] = parameters.friction_coefficient(inputs.pop(angle))
         for name in (one for one in _ESTIMATED if one in drawn):
             # Coulomb's yield acceleration depends on no shaking, which a record has of its own
             every = {"amplitude": xr.Variable((), 0.0), **inputs}
