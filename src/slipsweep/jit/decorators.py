@@ -43,7 +43,7 @@ inlined = part("arcp", forceinline=True, **_INTERNAL)
 single = part("arcp", inline="always", **_INTERNAL)
 
 #: The same for elementary functions, which have no division to share.
-elementary = part("nsz", forceinline=True, **_INTERNAL)
+elementary = part("nsz", forceinline=True)
 
 #: An equation: a function of Python, which kernels compile like `inlined`.  So it may be passed to
 #: them as a value, too.

@@ -2,11 +2,11 @@
 
 The base's motion comes in monotone pieces, from one zero, peak or sample to the next (`walk`).
 What the block does is its phase: it says what Ü is (`rate`).  Along a piece the block takes equal
-steps (`step_along`) by one of three rules (`advance`).  A step in which the phase ends (`excess`)
-is cut there, and the block goes on in the next phase (`end_phase`).  Eq. 12 takes a single step
-(`attenuate`).
+steps (`step_along`) by one of three rules (`advance`).  A step in which the phase ends (`may_end`)
+is taken again up to there, and the block goes on in the next phase (`take_step`).  Eq. 12 takes one
+step along a piece, exact for any length (`attenuate`).
 
-Time is the phase ωt here, so that V = ωv and W = ω²u; under a record it is the time at scale 1.
+Time here is ωt, so that V = ωv and W = ω²u; under a record it is the time at scale 1.
 docs/numerics.md#step-solver
 """
 
@@ -33,14 +33,15 @@ from slipsweep.kernels.block import (
 from slipsweep.model import equations as eq
 from slipsweep.motion.paths import TERMS, Base, Path
 
-#: Rules by which steps are taken; their errors are of the orders 1, 2 and 4.
+#: Rules by which steps are taken: Euler's, Heun's and, where friction does not depend on the motion,
+#: Simpson's, else that of Runge and Kutta.  Their errors are of the orders 1, 2 and 4.
 RECTANGLE = 0
 TRAPEZOID = 1
 SIMPSON = 2
 
 #: Stages of the rules: each evaluates the rate at a node, a part of the step, from the second on
 #: reached with the rate of the stage before it; their weights in the gain of V, over h, and of W,
-#: over h².  Simpson's rule is that of Runge and Kutta where friction does not depend on the motion.
+#: over h².
 RUNGE_KUTTA = 3
 STAGES = np.array([1, 1, 2, 3])  # after the first, which is known from the step before
 NODES = np.array([[0, 1, 0, 0], [0, 1, 0, 0], [0, 1 / 2, 1, 0], [0, 1 / 2, 1 / 2, 1]])
@@ -83,7 +84,7 @@ class Law(NamedTuple):
 STRENGTH_FIELDS = ("residual_mu", "weakening_distance", "fast_mu", "rate_constant")
 
 #: The cells that are stepped: a `Cell`, the yield acceleration upslope (NaN, if the block slides
-#: downslope only), the seconds in a unit of phase, and the parameters of its strength (NaN, if it is
+#: downslope only), the seconds in a unit of time, and the parameters of its strength (NaN, if it is
 #: of another kind).
 STEP_CELL = np.dtype(
     (
@@ -114,12 +115,12 @@ BLOCK = np.dtype(
             ("rate_constant", "f8"),
             ("weakens_until", "f8"),  # ∫|V| from which on the law does not depend on it
             ("g", "f8"),
-            ("seconds", "f8"),  # in a unit of phase
+            ("seconds", "f8"),  # in a unit of time
             ("mode", "i8"),  # `SlidingMode`; under a record that of the pulse
             ("rise", "i8"),
             ("recoupling", "i8"),
             ("rule", "i8"),
-            ("steps", "i8"),  # in 2π of phase
+            ("steps", "i8"),  # in 2π of time
             ("steps_on_piece", "i8"),  # under a record; else 0
             ("phase", "i8"),
             ("in_pulse", "i8"),  # from Üg = Üy to the end of the positive half wave
@@ -188,7 +189,7 @@ RESULTS = (
     "clearance",
 )
 
-#: How long a step may be after the onset of a slide (`step_along`); none is cut shorter than the last.
+#: How long a step may be after the onset of a slide (`step_along`).  None is shorter than the last.
 GROWTH_SHARE = 64.0
 TIME_SHARE = 16.0
 SHORTEST_STEP = 1e-14
