@@ -63,9 +63,8 @@ HATCHES = {
     Validity.FLEXIBLE_BLOCK: "++",
     Validity.UPSLOPE: "OO",
     Validity.NEAR_MODE_LIMIT: "..",
-    # of Newmark's block, which cannot have those of the same signs
-    Validity.MAY_NOT_STOP: "||",
-    Validity.NOT_AT_REST: "xx",
+    Validity.MAY_NOT_STOP: "|..",
+    Validity.NOT_AT_REST: "O.",
 }
 
 #: Hatching of displacements that have a trend which no block has.
