@@ -203,7 +203,7 @@ def _alternatives(own: Model) -> Iterator[tuple[str, Model, dict[str, Any], Look
 
 
 def _own_text(own: Model, data: xr.Dataset) -> str:
-    """What the options of a result are called."""
+    """Options of a result in words."""
     if not isinstance(own, Mendez):
         return style.NEWMARK
     given = data.coords.get("decay_rate")

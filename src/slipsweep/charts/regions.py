@@ -100,7 +100,7 @@ def paint(panel: Panel, xs: Floats, ys: Floats, margin: Floats, zorder: float, l
 
 
 def legend_patch(panel: Panel, look: Look) -> Patch:
-    """What stands for a region in the legend."""
+    """Sign of a region in the legend."""
     with mpl.rc_context({"hatch.linewidth": 0.6}):
         return Patch(linewidth=0.6, **{**look, "hatch": _dense(panel, look["hatch"])})
 

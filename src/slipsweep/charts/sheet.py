@@ -260,7 +260,7 @@ class Panel:
         return full.values.reshape([full.sizes[dim] if dim else 1 for dim in dims])
 
     def member(self, index: int) -> str:
-        """What a curve is called."""
+        """Name of a curve."""
         return "" if self.y is None else member_text(self.data, self.y, index, self.options)
 
     def add_title(self, text: str) -> None:
@@ -417,7 +417,7 @@ def member_text(data: xr.Dataset, dim: str, index: int, options: Options) -> str
 
 
 def is_log(values: Floats) -> bool:
-    """Whether an axis is spaced by a constant factor rather than a constant step."""
+    """Return True if an axis is spaced by a constant factor rather than a constant step."""
     if values.size < 3 or values[0] <= 0 or values[-1] < 3 * values[0]:
         return False
     steps = np.diff(values)

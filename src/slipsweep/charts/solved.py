@@ -68,12 +68,12 @@ SLIDES_BACK = (
 
 
 def is_recorded(data: xr.Dataset) -> bool:
-    """Whether a result is of recorded motions."""
+    """Return True if a result is of recorded motions."""
     return not {"record", "suite"}.isdisjoint(data.attrs)
 
 
 def is_newmark(data: xr.Dataset) -> bool:
-    """Whether a result is of Newmark's block."""
+    """Return True if a result is of Newmark's block."""
     return bool(data.attrs["model"] == "newmark")
 
 
@@ -199,7 +199,7 @@ def newmark(data: xr.Dataset) -> xr.DataArray | None:
 
 
 def has_flags(validity: xr.DataArray, flags: int) -> xr.DataArray:
-    """Where any of some flags is set."""
+    """Return True where any of some flags is set."""
     return (validity.fillna(0).astype(np.int64) & int(flags)) != 0
 
 

@@ -196,7 +196,7 @@ class Options:
         return 7.0 if self.is_narrow else 10.0
 
     def scale(self, name: str, g: float) -> float:
-        """What to multiply a parameter by to draw it."""
+        """Factor by which a parameter is drawn."""
         return 1.0 / g if self.units == "g" and is_acceleration(name) else 1.0
 
     def unit(self, name: str) -> str:
@@ -228,7 +228,7 @@ def to_light_grey(colour: Any) -> Any:
 
 
 def is_acceleration(name: str) -> bool:
-    """Whether a parameter is an acceleration, which people give in m/s² or in g."""
+    """Return True if a parameter is an acceleration, which people give in m/s² or in g."""
     return PARAMETERS.get(name, {}).get("units") == "m s-2"
 
 

@@ -109,7 +109,7 @@ class Excerpt:
         return [name for name in LAYERS if name in self.table]
 
     def is_log(self, dim: str) -> bool:
-        """Whether an axis is drawn by factors: the frequency, and others that are spread so."""
+        """Return True if an axis is drawn by factors: the frequency, and others that are spread so."""
         values = axis_numbers(self.table, dim)
         return (dim == "frequency" and values.size > 1) or is_log(values)
 

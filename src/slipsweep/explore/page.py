@@ -152,7 +152,7 @@ def write_page(
 
 
 def _digest(script: str) -> str:
-    """What a content security policy knows an inline script by."""
+    """Digest by which a content security policy knows an inline script."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
 
 
@@ -243,7 +243,7 @@ def _thinned(excerpt: Excerpt) -> list[tuple[str, str]]:
 
 
 def _notes(excerpt: Excerpt, histories: Histories | None) -> list[str]:
-    """What the page leaves out, and how."""
+    """Sentences on what the page leaves out."""
     shown, whole = (
         math.prod(sizes[dim] for dim in excerpt.lengths)
         for sizes in (excerpt.sizes, excerpt.lengths)

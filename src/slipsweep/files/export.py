@@ -266,7 +266,7 @@ class Table:
 
 
 def header(one: xr.DataArray) -> str:
-    """What stands above a column: a name and its unit."""
+    """Heading of a column: a name and its unit."""
     return f"{one.name} ({one.attrs['units']})" if "units" in one.attrs else str(one.name)
 
 

@@ -48,7 +48,7 @@ class Job:
 
     @cached_property
     def identity(self) -> dict[str, Any]:
-        """By what two runs know that they compute the same."""
+        """Settings that must agree for a run to be resumed."""
         found = {
             "version of slipsweep": __version__,
             "data type": self.floats,

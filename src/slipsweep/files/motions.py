@@ -138,7 +138,7 @@ def _suite(file: xr.Dataset, times: NDArray[Any], acceleration: NDArray[Any]) ->
 
 
 def digest_of(motion: Record | Suite) -> str:
-    """By what two runs know that their motions are the same: their samples and labels, not their files."""
+    """Digest of the samples and labels of motions, by which a run to be resumed knows them."""
     found = embedded(motion)
     values = [
         found[name].values

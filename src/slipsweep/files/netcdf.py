@@ -38,7 +38,7 @@ def described(
 
 
 def fill_value(name: str, dtype: np.dtype[Any]) -> float | int | None:
-    """What stands in a file for no value of a result."""
+    """Value that stands in a file for no value of a result."""
     if dtype.kind == "f" and name not in RECORD_SAMPLES:
         return float("nan")
     return int(SlidingMode.MISSING) if name in WITH_MISSING else None

@@ -152,7 +152,7 @@ def _complete(job: Job, path: Place) -> xr.Dataset | None:
 
 
 def _most_cells(plan: Plan, memory: int | None, workers: int) -> float:
-    """How many cells of a chunk the memory holds, if it is limited."""
+    """Number of cells of a chunk that the memory holds, if it is limited."""
     if memory is None:
         return math.inf
     base = _BASE_MEMORY + plan.memory + workers * (_WORKER_MEMORY + plan.memory)
@@ -173,7 +173,7 @@ def _most_cells(plan: Plan, memory: int | None, workers: int) -> float:
 
 
 def _chunk_cells(plan: Plan, most: float, processes: int) -> int:
-    """How many cells a chunk has: seconds of work, and enough chunks for all processes; cheap ones fill the memory."""
+    """Number of cells of a chunk: seconds of work, enough chunks for all processes; cheap cells fill the memory."""
     cells = max(1, int(CHUNK_CELLS / plan.cost))
     if processes:
         share = math.prod(plan.sizes.values()) // (_CHUNKS_A_WORKER * processes)

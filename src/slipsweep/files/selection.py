@@ -59,7 +59,7 @@ def axis_values(data: xr.Dataset, dim: str) -> list[Any]:
 
 
 def units_text(one: xr.DataArray, before: str = " ") -> str:
-    """What stands behind a number: its unit, if that is not 1."""
+    """Unit behind a number, if it is not 1."""
     units = one.attrs.get("units", "1")
     return "" if units == "1" else f"{before}{units}"
 

@@ -189,7 +189,7 @@ def load(path: str | Path) -> SweepSpec:
 
 
 def is_stream(path: Path) -> bool:
-    """Whether a sweep is read from a pipe or a shell's redirection: it has no folder and no name then."""
+    """Return True if a sweep is read from a pipe or a shell's redirection: it has no folder and no name then."""
     return path == Path("-") or (path.exists() and not path.is_file() and not path.is_dir())
 
 

@@ -76,7 +76,7 @@ class Request:
         return math.prod(self.sizes.values())
 
     def results(self) -> dict[str, xr.Variable]:
-        """What is wanted, not filled in."""
+        """Allocate the requested results."""
         dims = tuple(self.sizes)
         shape = tuple(self.sizes.values())
         return {

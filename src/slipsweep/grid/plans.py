@@ -304,7 +304,7 @@ def _friction_task(
 
 
 def _about(problem: grid_inputs.Problem, given: Collection[str]) -> dict[str, Any]:
-    """What results say of themselves: the choices read back from it are those of the problem."""
+    """Attributes of the results, from which the choices can be made again."""
     motion = problem.excitation
     title = "Response of a rigid block to a recorded motion"
     shaking: dict[str, Any]

@@ -54,7 +54,7 @@ _PARAMETER_ROWS = {
 
 
 class Solver(NamedTuple):
-    """What solves cells of a dtype into results, (rows, cells)."""
+    """Solver of cells of a dtype, whose results are (rows, cells)."""
 
     solve: Callable[[np.ndarray, np.ndarray], Any]
     rows: Mapping[str, int]  # of the results
@@ -62,7 +62,7 @@ class Solver(NamedTuple):
 
 
 def options_of(problem: Problem, wants_peak: bool) -> physics.Options:
-    """What all cells of a problem share, as the kernels take it."""
+    """Return what all cells of a problem share, for the kernels."""
     model = problem.model
     return physics.Options(
         rise=RISES[model.rise] if isinstance(model, Mendez) else physics.NEWMARK,
@@ -76,13 +76,13 @@ def options_of(problem: Problem, wants_peak: bool) -> physics.Options:
 
 
 def parameter_solver(problem: Problem) -> Solver:
-    """What finds Eqs. 7-11 and λ of cells."""
+    """Return the solver of Eqs. 7-11 and λ."""
     options = options_of(problem, wants_peak=False)
     return Solver(lambda cells, results: find_parameters(cells, options, results), _PARAMETER_ROWS)
 
 
 def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
-    """What solves the cells of a problem that one motion shakes."""
+    """Return the solver of the cells of a problem that one motion shakes."""
     motion = problem.excitation
     options = options_of(problem, wants_peak)
     if isinstance(problem.model, Newmark) and not isinstance(problem.solver, Step):
@@ -219,12 +219,12 @@ def stepping_kernel(model: Model) -> Callable[..., Any]:
 
 
 def is_plain_sine(motion: Any) -> bool:
-    """Whether a motion is a sine without ramps, whose cells are solved in batches."""
+    """Return True if a motion is a sine without ramps, whose cells are solved in batches."""
     return isinstance(motion, Sine) and not motion.ramp_in and not motion.ramp_out
 
 
 def cost_of(problem: Problem) -> int:
-    """What a cell takes, about, in those of a plain sine by the cycle solver."""
+    """Cost of a cell, relative to one under a plain sine by the exact solver."""
     motion = problem.excitation
     steps = problem.solver.steps_per_cycle if isinstance(problem.solver, Step) else 0
     if isinstance(motion, Waveform):

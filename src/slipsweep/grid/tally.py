@@ -39,7 +39,7 @@ class Ratios:
 
     @property
     def number(self) -> int:
-        """How many there are."""
+        """Number of ratios counted."""
         return int(self.counts.sum())
 
     def quantile(self, share: float) -> float:

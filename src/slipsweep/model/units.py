@@ -19,7 +19,7 @@ _UNIT_GRAMMAR = re.compile(rf"(?:1/)?{_FACTOR}(?:[ */]{_FACTOR}){{0,8}}")
 
 
 def conversion(key: str, own: str, units: str | None, g: float) -> float:
-    """What to multiply a number in `units` by, to have it in the unit `own` (InputError: they do not convert).
+    """Return the factor from `units` to the unit `own` (InputError: they do not convert).
 
     `key` is what the units are called in errors.  "g" as a unit of acceleration is `g`, the sweep's
     own gravity: an amplitude "in g" is meant against the gravity that the block feels.

@@ -45,7 +45,7 @@ class SlidingMode(IntEnum):
 
 
 class FlagKind(StrEnum):
-    """What a flag says of the value of its cell."""
+    """Kind of a flag: whether the value of its cell can be used."""
 
     NO_VALUE = "no value"  # NaN, and sliding mode missing
     CAUTION = "caution"
@@ -64,7 +64,7 @@ UNFLAGGED_TEXT = "another program has masked or joined these cells, and left the
 
 
 class Validity(IntFlag):
-    """What is to be known of a cell's value, or why it has none; 0 means that no flag is raised.
+    """Flags of a cell's value, or of why it has none; 0 means that no flag is raised.
 
     Each flag has its `kind` ("no value", "caution" or "note") and a `text` of one line.
 

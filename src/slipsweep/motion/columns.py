@@ -57,7 +57,7 @@ class _Text:
         return f"{self.width} numbers on a line{names}"
 
     def rises(self) -> bool:
-        """Whether the first column increases from line to line, as times do."""
+        """Return True if the first column increases from line to line, as times do."""
         steps = np.diff([float(row[0]) for row in self.cells if re.fullmatch(NUMBER, row[0])])
         return bool(
             steps.size and (steps > 0.0).mean() >= _RISES and (steps < 0.0).mean() <= _FALLS

@@ -94,7 +94,7 @@ def vertical_mark(component: str, path: Path | None = None) -> str | None:
 
 
 def is_unit(text: str) -> bool:
-    """Whether a cell of a heading is a unit and nothing else, of a time or of a motion."""
+    """Return True if a cell of a heading is a unit and nothing else, of a time or of a motion."""
     bare = text.strip("()[] ")
     return _plain(bare) in ("s", "ms", "min") or _first(iter([(bare, True)])) is not None
 
@@ -159,5 +159,5 @@ def _in_text(header: str) -> Iterator[tuple[str, bool]]:
 
 
 def is_sentence(line: str) -> bool:
-    """Whether a line of a header gives a value, or a date, and so is no name of a column."""
+    """Return True if a line of a header gives a value, or a date, and so is no name of a column."""
     return bool(re.search(r"[=:]|(?<![\w^*/-])\d", line))

@@ -160,7 +160,7 @@ def _energy(times: Floats, acceleration: Floats) -> "PPoly":
 
 
 def _zeros(curve: "PPoly") -> Floats:
-    """Where a curve is zero; a piece that is zero throughout has none."""
+    """Return where a curve is zero; a piece that is zero throughout has none."""
     found: Floats = curve.roots(discontinuity=False, extrapolate=False)
     return found[np.isfinite(found)]
 

@@ -18,7 +18,7 @@ COUNT = r"(\d{1,9})\b"
 
 
 class Samples(NamedTuple):
-    """What the file of a record holds."""
+    """Contents of the file of a record."""
 
     times: Floats  # s
     values: Floats  # accelerations in the file's own unit, NaN where blank

@@ -39,7 +39,7 @@ _NAMES: dict[str, tuple[set[str], ...]] = {
 
 @dataclass(frozen=True, eq=False)
 class ShakingTest:
-    """What was measured in a test on a shaking table.
+    """Measurements of a test on a shaking table.
 
     `times` (s) increase, at intervals that need not be equal.  `channels` are `ground_acceleration`
     (m/s², of the table), without a gap, and any of `block_acceleration` (m/s²), `relative_velocity`
@@ -175,6 +175,6 @@ def read_test(path: str | Path) -> ShakingTest:
 
 
 def unit_factor(key: str, channel: str, unit: str) -> float:
-    """What to multiply a channel in `unit` by, to have it in SI units."""
+    """Factor from a unit of a channel to the SI unit."""
     own = "s" if channel == "time" else HISTORY[channel]["units"]
     return conversion(key, own, unit.lower() if unit.lower() in UNITS else unit, STANDARD_GRAVITY)

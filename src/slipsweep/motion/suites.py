@@ -79,7 +79,7 @@ class Pair:
 
     @property
     def name(self) -> str:
-        """What the pair is called in messages."""
+        """Name of the pair in messages."""
         return f"{self.first.name}, {self.second.name}"
 
     @property
@@ -212,7 +212,7 @@ class Suite:
 
     @property
     def has_pairs(self) -> bool:
-        """Whether the motions are pairs of components."""
+        """Return True if the motions are pairs of components."""
         return isinstance(self.motions[0], Pair)
 
     @property
@@ -417,7 +417,7 @@ def _components(motion: Motion) -> tuple[Record, ...]:
 
 
 def _sources(given: Any, folder: Path) -> list[_Source]:
-    """What entries name, each file once."""
+    """Files that entries name, each once."""
     what = "files, folders, patterns, pairs of files or Records"
     parts = (str, Path, Record)
     found = list[_Source]()

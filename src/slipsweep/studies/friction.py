@@ -129,7 +129,7 @@ def slides_of(times: Floats, table: Floats, block: Floats, threshold: float) -> 
 
 
 def _in_turn(holds: NDArray[np.bool_], count: int) -> NDArray[np.bool_]:
-    """Where something holds at a sample and at those after it, `count` in all."""
+    """Return True where something holds at `count` samples in a row."""
     return np.asarray(np.convolve(holds, np.ones(count))[count - 1 :] == count)
 
 

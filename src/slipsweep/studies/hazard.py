@@ -198,7 +198,7 @@ def read_hazard_curve(
 
 
 def _says(pattern: str, text: str) -> bool:
-    """Whether a heading says something; underscores separate words as blanks do."""
+    """Return True if a heading says something; underscores separate words as blanks do."""
     return bool(re.search(pattern, text.replace("_", " "), re.IGNORECASE))
 
 

@@ -352,7 +352,7 @@ class Scan:
         return {name: one.values for name, one in found.items()}
 
     def reach(self, amplitude: Floats, cell: Indices) -> NDArray[np.bool_]:
-        """Whether some cells reach their targets at amplitudes of their own."""
+        """Return True where cells reach their targets at amplitudes of their own."""
         moved = criterion.displacement_of(self.solve(amplitude, cell, self.moved))
         return np.asarray(moved >= self.targets[cell].reshape(-1, *(1,) * (amplitude.ndim - 1)))
 

@@ -219,7 +219,7 @@ class Sampling:
             raise InputError(f"{keys}samples = {self.samples}: {taken}")
 
     def key(self, parameter: Any) -> str:
-        """What a distribution is called in errors."""
+        """Name of a distribution in errors."""
         return f"{self.keys or 'uncertain.'}{parameter}"
 
     @functools.cached_property
