@@ -19,6 +19,7 @@ ROOT = Path(__file__).parents[1]
 #: What pages link to; other results of benchmarks stand in the pages themselves.
 MEASUREMENTS = [
     "benchmarks/README.md",
+    "benchmarks/results/record_times.md",
     "benchmarks/results/records.md",
 ]
 

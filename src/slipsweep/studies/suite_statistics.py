@@ -75,7 +75,7 @@ def suite_statistics(
           of all displacements, those that are zero, too.
 
         All but the counts and `valueless_share` are of the motions that have a value, NaN where
-        none has.  Of a block that slides both ways they are of |u|.
+        none has.  Of a block that slides both ways they are of ``|u|``.
 
     Raises
     ------

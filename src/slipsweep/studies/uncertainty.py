@@ -150,7 +150,7 @@ def sample(
           dimension `threshold` (m): P(u > threshold).  They are of the samples that have a value;
           NaN where none has. Statically unstable samples, and those that do not come to rest after
           the shaking, have no value, and are counted as exceeding every threshold.  Of a block that
-          slides both ways they are of |u|.
+          slides both ways they are of ``|u|``.
         - `mode_share` (not under a record), dimension `mode`, `flag_share`, dimension `flag`, and `valueless_share`: of
           all samples, how many slide in which mode, have which flag, and have no value.  They do
           not depend on the frequency (of a record: the time scale) and have no such dimension (but
