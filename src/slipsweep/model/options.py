@@ -66,7 +66,7 @@ class Newmark(Choice):
     sliding : {"downslope", "both"}
         Directions in which it slides.  With "both" its acceleration is −Üy,up while it slides
         upslope (`upslope_yield_acceleration`); displacements may then be negative, and what counts
-        them, statistics and charts, takes |u|.
+        them, statistics and charts, takes ``|u|``.
     strength : {"constant", "weakening", "rate"}
         Friction while it slides: μs; μr + (μs − μr) max(0, 1 − s/D), which falls with the slip s =
         ∫|v|dt (`residual_mu` μr, `weakening_distance` D); or μf − (μf − μs) e^(−a|v|), which depends
