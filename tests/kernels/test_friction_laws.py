@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import registered
 from slipsweep.kernels import step
-from slipsweep.kernels.block import EQ12, LITERAL, NEWMARK, Options
+from slipsweep.kernels.block import EQ12, LITERAL, NEWMARK, RESULTS, Options
 from slipsweep.motion.cutting import path_of_waveform
 from slipsweep.motion.waveforms import Sine
 
@@ -81,7 +81,7 @@ def motion_of(
     for name, value in cell.items():
         cells[name] = value
     path = path_of_waveform(Sine(cycles=cycles))
-    results = np.empty((len(step.RESULTS), 1))
+    results = np.empty((len(RESULTS), 1))
     solve(
         cells,
         Options(rise, EQ12, cycles, True, G),
@@ -91,7 +91,7 @@ def motion_of(
         np.empty(0, step.LOG),
         results,
     )
-    return dict(zip(step.RESULTS, results[:, 0], strict=True))
+    return dict(zip(RESULTS, results[:, 0], strict=True))
 
 
 # ------------------------------------------------------------------ the same by SciPy

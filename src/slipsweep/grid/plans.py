@@ -17,7 +17,7 @@ from slipsweep._version import __version__
 from slipsweep.errors import InputError
 from slipsweep.grid import chunks, engine, resources
 from slipsweep.grid import inputs as grid_inputs
-from slipsweep.grid.solvers import NEWMARK_ROWS, ROWS, cost_of, memory_of
+from slipsweep.grid.solvers import ROWS, ROWS_WITH_EXTREMES, cost_of, memory_of
 from slipsweep.model import options
 from slipsweep.model import variables as known
 from slipsweep.model.parameters import check_choices, check_friction, check_given, check_progress
@@ -195,7 +195,7 @@ def plan_sweep(
     if motion := tuple(
         name
         for name in wanted
-        if (name in ROWS or name in NEWMARK_ROWS) and name != "newmark_displacement"
+        if (name in ROWS or name in ROWS_WITH_EXTREMES) and name != "newmark_displacement"
     ):
         tasks.append(_task(engine.solve, problem, motion, solved))
     if "newmark_displacement" in wanted:

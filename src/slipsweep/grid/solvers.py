@@ -41,11 +41,9 @@ ROWS = {_NAMES.get(field, field): row for row, field in enumerate(physics.Motion
 # Newmark's block is solved as a problem of its own
 ROWS["newmark_displacement"] = ROWS["permanent_displacement"]
 
-NEWMARK_ROWS = {name: row for row, name in enumerate(newmark.RESULTS)}
-NEWMARK_ROWS["newmark_displacement"] = NEWMARK_ROWS["permanent_displacement"]
-
-STEP_ROWS = {name: row for row, name in enumerate(step.RESULTS)}
-STEP_ROWS["newmark_displacement"] = STEP_ROWS["permanent_displacement"]
+#: The same of steps and of Newmark's block, which have extremes, too.
+ROWS_WITH_EXTREMES = {name: row for row, name in enumerate(physics.RESULTS)}
+ROWS_WITH_EXTREMES["newmark_displacement"] = ROWS_WITH_EXTREMES["permanent_displacement"]
 
 #: The same of `find_parameters`.
 _PARAMETER_ROWS = {
@@ -103,7 +101,9 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
         stepper = stepper_of(problem, options, polarity)
         no_log = np.empty(0, step.LOG)
         return Solver(
-            lambda cells, results: stepper(cells, no_log, results), STEP_ROWS, step.STEP_CELL
+            lambda cells, results: stepper(cells, no_log, results),
+            ROWS_WITH_EXTREMES,
+            step.STEP_CELL,
         )
     if isinstance(motion, Record):
         path = cutting.path_of_record(motion, polarity)
@@ -134,7 +134,7 @@ def newmark_solver(problem: Problem, options: physics.Options, polarity: float) 
         others = np.full(left.size, math.nan, newmark.NEWMARK_CELL)
         for name in newmark.DOWNSLOPE_FIELDS:
             others[name] = cells[name][left]
-        solved = np.empty((len(newmark.RESULTS), left.size))
+        solved = np.empty((len(physics.RESULTS), left.size))
         solve(others, solved)
         results[:, left] = solved[: results.shape[0]]
 
@@ -142,7 +142,7 @@ def newmark_solver(problem: Problem, options: physics.Options, polarity: float) 
     in_batches = is_plain_sine(motion) and not problem.walked
     if in_batches and not slides_both_ways(problem.model):
         return Solver(solve_in_batches, ROWS)
-    return Solver(solve, NEWMARK_ROWS, newmark.NEWMARK_CELL)
+    return Solver(solve, ROWS_WITH_EXTREMES, newmark.NEWMARK_CELL)
 
 
 def newmark_record_solver(record: Record, g: float, polarity: float) -> Solver:
@@ -153,7 +153,7 @@ def newmark_record_solver(record: Record, g: float, polarity: float) -> Solver:
         blocks = np.zeros(1, newmark.BLOCK)
         newmark_record.solve_newmark_record(cells, g, samples, blocks, results)
 
-    return Solver(solve, NEWMARK_ROWS, newmark.NEWMARK_CELL)
+    return Solver(solve, ROWS_WITH_EXTREMES, newmark.NEWMARK_CELL)
 
 
 def path_under(motion: Waveform | Record, polarity: float) -> Path:

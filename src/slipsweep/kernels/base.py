@@ -82,6 +82,25 @@ def offset_at(piece: Piece, curve: Curve, amplitude: float, x: float) -> float:
     return _offset_root((piece, curve, offset), below, above, first, 0.0)
 
 
+@inlined
+def moments(curve: Curve, degree: int, start: float, end: float) -> tuple[float, float]:
+    """Return ∫ (w − top) dτ and ∫ (end − τ)(w − top) dτ on a curved piece, by its Taylor series."""
+    once_start = 0.0
+    once_end = 0.0
+    twice_start = 0.0
+    twice_end = 0.0
+    for k in range(degree - 1, -1, -1):
+        once = curve.once[k]
+        twice = curve.twice[k]
+        once_start = once_start * start + once
+        once_end = once_end * end + once
+        twice_start = twice_start * start + twice
+        twice_end = twice_end * end + twice
+    once_start *= start * start
+    second = twice_end * end * end * end - twice_start * start * start * start
+    return once_end * end * end - once_start, second - once_start * (end - start)
+
+
 @scalar
 def held_gains(
     piece: Piece, curve: Curve, amplitude: float, held: float, start: float, end: float
@@ -106,20 +125,6 @@ def held_gains(
         first = -piece.top * (angle_minus_sine(end) - before)
         second = -piece.top * (whole - before * width)
     else:
-        once_start = 0.0
-        once_end = 0.0
-        twice_start = 0.0
-        twice_end = 0.0
-        for k in range(piece.degree - 1, -1, -1):
-            once = curve.once[k]
-            twice = curve.twice[k]
-            once_start = once_start * start + once
-            once_end = once_end * end + once
-            twice_start = twice_start * start + twice
-            twice_end = twice_end * end + twice
-        once_start *= start * start
-        first = once_end * end * end - once_start
-        moment = twice_end * end * end * end - twice_start * start * start * start
-        second = moment - once_start * width
+        first, second = moments(curve, piece.degree, start, end)
     excess = amplitude * piece.top - held
     return excess * width + amplitude * first, 0.5 * excess * width * width + amplitude * second

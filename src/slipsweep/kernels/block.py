@@ -95,6 +95,21 @@ class Motion(NamedTuple):
     continuous_pulses: float
 
 
+#: Rows of the results of a cell by steps, or of Newmark's block; the counts are those of a record.
+RESULTS = (
+    "permanent_displacement",
+    "peak_relative_velocity",
+    "sliding_mode",
+    "validity",
+    "number_of_slips",
+    "stick_slip_pulses",
+    "continuous_pulses",
+    "largest_displacement",
+    "smallest_displacement",
+    "clearance",
+)
+
+
 @inlined
 def given_or(given: float, estimate: float) -> float:
     """What is given, or where that is NaN its estimate."""

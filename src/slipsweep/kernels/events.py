@@ -58,3 +58,19 @@ def root_of(value_and_slope: Callable[[Any, float], tuple[float, float]]) -> Cal
         return x if abs(x - origin) <= _AT_ORIGIN * width else math.nan
 
     return root
+
+
+@scalar
+def straight_stop(velocity: float, rate: float, slope: float) -> float:
+    """Return the time after which V ≥ 0, of a rate that changes by `slope`, is 0; infinity: never.
+
+    The roots of V + rate t + slope t²/2, each by the form that does not cancel.
+    docs/numerics.md#straight-pieces
+    """
+    square = rate * rate - 2.0 * slope * velocity
+    if rate > 0.0:
+        return (rate + math.sqrt(square)) / -slope if slope < 0.0 else math.inf
+    if square < 0.0:
+        return math.inf
+    fall = math.sqrt(square) - rate
+    return 2.0 * velocity / fall if fall > 0.0 else math.inf

@@ -19,7 +19,9 @@ import numpy as np
 
 from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import scalar
+from slipsweep.kernels.base import moments
 from slipsweep.kernels.block import STATICALLY_UNSTABLE, UNSOLVED, given_or
+from slipsweep.kernels.events import straight_stop
 from slipsweep.model import equations as eq
 from slipsweep.motion.paths import Curve, Path, Piece
 
@@ -65,20 +67,6 @@ BLOCK = np.dtype(
 Block: TypeAlias = Any
 Cell: TypeAlias = Any
 
-#: Rows of the results of a cell; the counts are those of a record.
-RESULTS = (
-    "permanent_displacement",
-    "peak_relative_velocity",
-    "sliding_mode",
-    "validity",
-    "number_of_slips",
-    "stick_slip_pulses",
-    "continuous_pulses",
-    "largest_displacement",
-    "smallest_displacement",
-    "clearance",
-)
-
 #: Relative size of the last step to a root, whose error is its square, and the most steps.
 TOLERANCE = 1e-9
 MOST_STEPS = 200
@@ -123,21 +111,8 @@ def gains(
         slope = scale * piece.slope
         gained = (excess + 0.5 * slope * (start + end)) * width
         return gained, (0.5 * excess + slope * (2.0 * start + end) / 6.0) * width * width
-    once_start = 0.0
-    once_end = 0.0
-    twice_start = 0.0
-    twice_end = 0.0
-    for k in range(piece.degree - 1, -1, -1):
-        once = curve.once[k]
-        twice = curve.twice[k]
-        once_start = once_start * start + once
-        once_end = once_end * end + once
-        twice_start = twice_start * start + twice
-        twice_end = twice_end * end + twice
-    once_start *= start * start
-    moment = twice_end * end * end * end - twice_start * start * start * start
-    gained = excess * width + scale * (once_end * end * end - once_start)
-    return gained, 0.5 * excess * width * width + scale * (moment - once_start * width)
+    first, second = moments(curve, piece.degree, start, end)
+    return excess * width + scale * first, 0.5 * excess * width * width + scale * second
 
 
 @scalar
@@ -201,21 +176,6 @@ def root_of_speed(
         if step <= TOLERANCE * (tau - start) or step <= 4e-16 * abs(tau):
             return tau
     return math.nan
-
-
-@scalar
-def stop_on_line(speed: float, rate: float, slope: float) -> float:
-    """Return when a speed ≥ 0, whose rate grows by `slope`, first falls to 0 (infinity: never).
-
-    The roots of a quadratic, each in the form that does not cancel.
-    """
-    square = rate * rate - 2.0 * slope * speed
-    if rate > 0.0:
-        return (rate + math.sqrt(square)) / -slope if slope < 0.0 else math.inf
-    if square < 0.0:
-        return math.inf
-    fall = math.sqrt(square) - rate
-    return 2.0 * speed / fall if fall > 0.0 else math.inf
 
 
 @scalar
@@ -287,7 +247,7 @@ def slide_along(
         rate = max(rate, 0.0)  # of a slide that begins; below 0 is rounding
     if piece.degree <= 1:
         slope = scale * piece.slope
-        stop = tau + stop_on_line(speed, rate, slope)
+        stop = tau + straight_stop(speed, rate, slope)
         largest = speed
         turns = rate + slope * (finish - tau)
         if rate > 0.0 > turns:
@@ -450,7 +410,7 @@ def begin(block: Block, cell: Cell, g: float) -> bool:
 
 @scalar
 def store(block: Block, pulses: float, result: np.ndarray) -> None:
-    """Let the block run out after the shaking, and write what has become of it (`RESULTS`,)."""
+    """Let the block run out after the shaking, and write what has become of it (`block.RESULTS`,)."""
     side = math.copysign(1.0, block.velocity)
     limit = block.yield_acceleration if side > 0.0 else block.upslope_yield_acceleration
     block.displacement += side * block.velocity * block.velocity / (2.0 * limit)
@@ -486,7 +446,7 @@ def solve_newmark(
     blocks: np.ndarray,
     results: np.ndarray,
 ) -> None:
-    """Solve the cells of a tile, of `NEWMARK_CELL`; `results` is (`RESULTS`, cells).
+    """Solve the cells of a tile, of `NEWMARK_CELL`; `results` is (`block.RESULTS`, cells).
 
     `blocks`, (1,) of `BLOCK`, is what the motion is kept in.
     """

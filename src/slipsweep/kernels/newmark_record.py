@@ -16,12 +16,12 @@ import numpy as np
 
 from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import scalar
+from slipsweep.kernels.events import straight_stop
 from slipsweep.kernels.newmark import (
     Block,
     add,
     begin,
     reach,
-    stop_on_line,
     store,
     store_no_value,
 )
@@ -145,7 +145,7 @@ def slide(
             after = half + 0.5 * last_rate * left
             if (after <= 0.0) | ((half <= 0.0) & (speed > 0.0)):
                 slope = slope_of(samples, i, scale)
-                stop = stop_on_line(speed, rate, slope)
+                stop = straight_stop(speed, rate, slope)
                 if after <= 0.0 or stop <= left:
                     stop = min(stop, left)
                     if rate > 0.0:
@@ -226,7 +226,7 @@ def pulses_beyond_yield(block: Block, peaks: np.ndarray) -> float:
 def solve_newmark_record(
     cells: np.ndarray, g: float, samples: Samples, blocks: np.ndarray, results: np.ndarray
 ) -> None:
-    """Solve the cells of a tile, of `NEWMARK_CELL`; `results` is (`newmark.RESULTS`, cells).
+    """Solve the cells of a tile, of `NEWMARK_CELL`; `results` is (`block.RESULTS`, cells).
 
     `blocks`, (1,) of `newmark.BLOCK`, is what the motion is kept in.
     """

@@ -175,20 +175,6 @@ class Steps(NamedTuple):
     first: np.ndarray  # (pieces + 1,) where the points of a piece begin
 
 
-#: Rows of the results of a cell; the counts are those of a record.
-RESULTS = (
-    "permanent_displacement",
-    "peak_relative_velocity",
-    "sliding_mode",
-    "validity",
-    "number_of_slips",
-    "stick_slip_pulses",
-    "continuous_pulses",
-    "largest_displacement",
-    "smallest_displacement",
-    "clearance",
-)
-
 #: How long a step may be after the onset of a slide (`step_along`).  None is shorter than the last.
 GROWTH_SHARE = 64.0
 TIME_SHARE = 16.0
@@ -352,16 +338,18 @@ def ground_in_step(
 
 
 @scalar
-def place_of(block: Block, base: Base, p: int, level: float) -> float:
-    """Return τ at which |Üg| reaches a level on a piece on which it grows (the end, if it does not)."""
+def place_beyond(block: Block, base: Base, p: int, level: float, rises: bool) -> float:
+    """Return τ at which Üg passes a level that it has passed at the end of piece p."""
     piece = base.pieces[p]
-    if block.amplitude * abs(piece.first) >= level:
+    first = block.amplitude * piece.first
+    if first >= level if rises else first <= level:
         return piece.begin
     low = piece.begin
     high = piece.finish
     while low < 0.5 * (low + high) < high:
         middle = 0.5 * (low + high)
-        if abs(ground_at(block, base, p, middle)) >= level:
+        ground = ground_at(block, base, p, middle)
+        if ground >= level if rises else ground <= level:
             high = middle
         else:
             low = middle
@@ -377,22 +365,41 @@ def opposite(first: float, last: float) -> bool:
     return first < 0.0 < last or last < 0.0 < first
 
 
+@registered
+def cubic(velocity: Any, h: Any, gained: Any, first_rate: Any, last_rate: Any, part: Any) -> Any:
+    """V after a part of a step h: the cubic through the values and rates at both ends."""
+    left = 1.0 - part
+    bend = part * left * (left * first_rate - part * last_rate) * h
+    return velocity + part * part * (3.0 - 2.0 * part) * gained + bend
+
+
+@registered
+def integral_of_cubic(
+    velocity: Any, h: Any, gained: Any, first_rate: Any, last_rate: Any, part: Any
+) -> Any:
+    """W gained in a part of a step h: the integral of `cubic`."""
+    early = first_rate * part**2 * (0.5 - part * (2.0 / 3.0 - 0.25 * part))
+    late = last_rate * part**3 * (1.0 / 3.0 - 0.25 * part)
+    mean = velocity * part + gained * part**3 * (1.0 - 0.5 * part)
+    return h * (mean + h * (early - late))
+
+
 @inlined
 def velocity_in_step(block: Block, step: Step, part: float) -> float:
-    """V after a part of a step: the cubic through the values and rates at both ends."""
-    left = 1.0 - part
-    gained = part * part * (3.0 - 2.0 * part) * step.gained
-    bend = part * left * (left * step.first_rate - part * step.last_rate) * step.h
-    return block.velocity + gained + bend
+    """V after a part of a step."""
+    velocity: float = cubic(
+        block.velocity, step.h, step.gained, step.first_rate, step.last_rate, part
+    )
+    return velocity
 
 
 @inlined
 def displacement_in_step(block: Block, step: Step, part: float) -> float:
-    """W gained in a part of a step: the integral of `velocity_in_step`."""
-    gained = step.gained * part**3 * (1.0 - 0.5 * part)
-    early = step.first_rate * part**2 * (0.5 - part * (2.0 / 3.0 - 0.25 * part))
-    late = step.last_rate * part**3 * (1.0 / 3.0 - 0.25 * part)
-    return step.h * (block.velocity * part + gained + step.h * (early - late))
+    """W gained in a part of a step."""
+    moved: float = integral_of_cubic(
+        block.velocity, step.h, step.gained, step.first_rate, step.last_rate, part
+    )
+    return moved
 
 
 @scalar
@@ -584,25 +591,6 @@ def end_positive_half_wave(block: Block) -> None:
 
 
 @scalar
-def place_beyond(block: Block, base: Base, p: int, level: float, rises: bool) -> float:
-    """Return τ at which Üg passes a level that it has passed at the end of piece p."""
-    piece = base.pieces[p]
-    first = block.amplitude * piece.first
-    if first >= level if rises else first <= level:
-        return piece.begin
-    low = piece.begin
-    high = piece.finish
-    while low < 0.5 * (low + high) < high:
-        middle = 0.5 * (low + high)
-        ground = ground_at(block, base, p, middle)
-        if ground >= level if rises else ground <= level:
-            high = middle
-        else:
-            low = middle
-    return high
-
-
-@scalar
 def wait_for_yield(law: Law, block: Block, base: Base, p: int, tau: float) -> float:
     """Return τ at which Newmark's block at rest begins to slide: where Üg exceeds what it resists."""
     piece = base.pieces[p]
@@ -633,7 +621,7 @@ def wait_for_eq4(law: Law, block: Block, base: Base, p: int, tau: float, end: fl
     if block.amplitude * base.pieces[p].last < block.yield_acceleration:
         return base.pieces[p].finish
     if ground_at(block, base, p, tau) < block.yield_acceleration:
-        tau = place_of(block, base, p, block.yield_acceleration)
+        tau = place_beyond(block, base, p, block.yield_acceleration, True)
     ground = ground_at(block, base, p, tau)
     if eq4_of(law, block, ground) < ground:
         begin_stick_slip(law, block, base, p, tau, True, ground)
@@ -1015,7 +1003,7 @@ def walk(
         if comes and highest >= block.yield_acceleration:
             reaches = piece.begin
             if rises and not law.is_strength:
-                reaches = place_of(block, base, p, block.yield_acceleration)
+                reaches = place_beyond(block, base, p, block.yield_acceleration, True)
         block.zero = offset + piece.start - piece.begin
         points = steps.wave[steps.first[p] : steps.first[p + 1]]
         tau = piece.begin
@@ -1301,7 +1289,7 @@ def solve_cell(
     log: np.ndarray,
     result: np.ndarray,
 ) -> None:
-    """Step a cell through the shaking and on to rest; `result` is (`RESULTS`,)."""
+    """Step a cell through the shaking and on to rest; `result` is (`block.RESULTS`,)."""
     put_at_rest(law, block, cell, options)
     block.validity = validity_before(block, cell, options, path)
     mode = block.mode
@@ -1368,7 +1356,7 @@ def solve_steps(
     """Step the cells of a tile with the friction law of the paper.
 
     `cells` are of dtype `STEP_CELL`; `blocks`, (1,), says how they are stepped (`blocks_of`); `log`
-    is of dtype `LOG`, empty if no history is asked for; `results` is (`RESULTS`, cells).
+    is of dtype `LOG`, empty if no history is asked for; `results` is (`block.RESULTS`, cells).
     """
     law = Law(exponential_friction, False, False, False, unlimited)
     solve_cells(law, cells, options, path, blocks, steps, log, results)
@@ -1430,21 +1418,9 @@ def samples_of(
     since = phases - row["time"]
     rests = (since > step) & ~goes_on
     part = np.clip(since / np.maximum(step, np.finfo(float).tiny), 0.0, 1.0)
-    gained = row["gained"]
-    first = row["first_rate"] * step
-    last = row["last_rate"] * step
-    velocity = (
-        row["velocity"]
-        + gained * part**2 * (3.0 - 2.0 * part)
-        + first * part * (1.0 - part) ** 2
-        - last * part**2 * (1.0 - part)
-    )
-    displacement = row["displacement"] + step * (
-        row["velocity"] * part
-        + gained * (part**3 - 0.5 * part**4)
-        + first * part**2 * (0.5 - 2.0 / 3.0 * part + 0.25 * part**2)
-        - last * part**3 * (1.0 / 3.0 - 0.25 * part)
-    )
+    in_step = row["velocity"], step, row["gained"], row["first_rate"], row["last_rate"], part
+    velocity = cubic(*in_step)
+    displacement = row["displacement"] + integral_of_cubic(*in_step)
     bend = 2.0 * (row["first"] + row["last"] - 2.0 * row["middle"])
     block = row["first"] + part * (row["last"] - row["first"] - bend) + part**2 * bend
     block = np.where(row["phase"] == ATTENUATES, ground - row["first_rate"], block)

@@ -31,7 +31,7 @@ from slipsweep.kernels.eq4 import (
     response,
     slopes,
 )
-from slipsweep.kernels.events import root_of
+from slipsweep.kernels.events import root_of, straight_stop
 from slipsweep.kernels.slide import (
     ATTENUATES,
     FOLLOWS_EQ4,
@@ -171,22 +171,6 @@ def _lost(where: tuple[Block, Piece, Curve, Slide, float], tau: float) -> tuple[
 
 
 _stop_root = root_of(_lost)
-
-
-@scalar
-def straight_stop(velocity: float, rate: float, slope: float) -> float:
-    """Return the time after which V ≥ 0, of a rate that changes by `slope`, is 0; infinity: never.
-
-    The roots of V + rate t + slope t²/2, each by the form that does not cancel.
-    docs/numerics.md#straight-pieces
-    """
-    square = rate * rate - 2.0 * slope * velocity
-    if rate > 0.0:
-        return (rate + math.sqrt(square)) / -slope if slope < 0.0 else math.inf
-    if square < 0.0:
-        return math.inf
-    fall = math.sqrt(square) - rate
-    return 2.0 * velocity / fall if fall > 0.0 else math.inf
 
 
 @scalar

@@ -14,6 +14,7 @@ from slipsweep.errors import InputError
 from slipsweep.grid import engine, plans, resources, solvers
 from slipsweep.grid import inputs as grid_inputs
 from slipsweep.kernels import step
+from slipsweep.kernels.block import RESULTS
 from slipsweep.kernels.history import History
 from slipsweep.model import equations as eq
 from slipsweep.model import options, parameters, variables
@@ -208,7 +209,7 @@ class _History:
         cells = np.full((1, len(step.STEP_CELL.names or ())), math.nan).view(step.STEP_CELL)[:, 0]
         for name, value in self.fields.items():
             cells[name] = value
-        results = np.empty((len(step.RESULTS), 1))
+        results = np.empty((len(RESULTS), 1))
         # once to count the steps, once to note them
         counted = _interruptible(stepper, cells, np.empty(1, step.LOG), results)
         log = np.empty(int(counted["logged"]), step.LOG)
