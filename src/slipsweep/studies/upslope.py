@@ -5,12 +5,12 @@ level or gentle base a block also slides back, and ends near where it began.
 """
 
 import inspect
-import math
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from slipsweep.grid import engine
 from slipsweep.model import equations
 from slipsweep.model.options import Mendez
 from slipsweep.motion.cutting import wave_of
@@ -32,9 +32,14 @@ def upslope_yield_acceleration(
     By statics g tan(arctan(Üy/g) + 2θ), which is g tan(φs + θ) with Coulomb's Üy; `theta` is in
     degrees.  Infinite where the angle reaches 90°.
     """
-    angle = xr.apply_ufunc(np.arctan, yield_acceleration / g) + np.radians(2.0) * theta
-    onset: xr.DataArray = g * xr.apply_ufunc(np.tan, angle)
-    return onset.where(angle < 0.5 * math.pi, math.inf)
+    tan_theta = xr.apply_ufunc(np.tan, np.radians(1.0) * theta)
+
+    def by_statics(onset: Any, tangent: Any) -> Any:
+        given = {"yield_acceleration": onset, "tan_theta": tangent}
+        return engine.upslope_yield_acceleration(given, g)
+
+    onset: xr.DataArray = xr.apply_ufunc(by_statics, yield_acceleration, tan_theta)
+    return onset
 
 
 def sliding_ways(
