@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 
 from slipsweep import (
+    Newmark,
     Sine,
     SlidingMode,
     Validity,
@@ -98,6 +99,25 @@ def test_histories_are_those_of_simulate(written: Path) -> None:
                 store["cycles"] if name == "block_acceleration" else 0
             )
     assert seen == {SlidingMode.STUCK, SlidingMode.STICK_SLIP, SlidingMode.CONTINUOUS}
+
+
+def test_histories_of_a_block_that_slides_both_ways_are_those_of_simulate(tmp_path: Path) -> None:
+    model = Newmark(sliding="both")
+    sweep([2, 5], 0.3, [4, 8], [1, 2], model=model).to_netcdf(tmp_path / "both.nc")
+    write_page(tmp_path / "both.nc", tmp_path / "both.html")
+    meta, arrays = contents(tmp_path / "both.html")
+    phase = np.array(meta["histories"]["phase"])
+    times = phase / (2.0 * math.pi)  # those of 1 Hz
+    for place, case in enumerate([(2, 4), (2, 8), (5, 4), (5, 8)]):
+        theta, amplitude = case
+        expected = simulate(theta, 0.3, amplitude, 1.0, times=times, model=model)
+        velocity = arrays["histories"].reshape(4, 3, -1)[place, 1]
+        scale = float(arrays["history_scale"].reshape(4, 3)[place, 1])
+        largest = float(np.abs(expected.relative_velocity).max())
+        np.testing.assert_allclose(
+            velocity * scale / (2.0 * math.pi), expected.relative_velocity, atol=largest / 60_000
+        )
+    assert float(expected.relative_velocity.min()) < 0.0
 
 
 def test_large_result_is_thinned_to_the_size_and_says_how(tmp_path: Path) -> None:

@@ -96,10 +96,10 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
     has_values = (plan.solve()["validity"].variable.set_dims(left).values & VALUELESS) == 0
     problem = Problem(model, motion, Cycle())
     path = path_of_waveform(motion)
-    fields = {
-        name: xr.as_variable(values).set_dims(left).values
-        for name, values in engine.cell_inputs(problem, plan.coords).items()
+    coords = {
+        name: xr.as_variable(values).set_dims(left).values for name, values in plan.coords.items()
     }
+    fields = engine.cell_inputs(problem, coords)
     phase = np.linspace(0.0, 2.0 * math.pi * cycles, points)
     ground = np.zeros(points)
     values = np.zeros((*left.values(), len(_COLUMNS), points), np.int16)
