@@ -84,12 +84,12 @@ def test_run_paper(tmp_path: Path) -> None:
 def test_run_repeats_a_result(small: Path) -> None:
     assert command(small, "run", "small.toml", "-o", "a.nc", "--solver", "step").returncode == 0
     assert command(small, "run", "a.nc", "-o", "b.nc", "--quiet").stdout == ""
-    with netCDF4.Dataset(small / "a.nc") as one, netCDF4.Dataset(small / "b.nc") as other:
+    with netCDF4.Dataset(small / "a.nc") as first, netCDF4.Dataset(small / "b.nc") as other:
         assert other.sweep == SMALL
         assert other.solver == "step"
-        assert list(one.variables) == list(other.variables)
-        for name in one.variables:
-            np.testing.assert_array_equal(one[name][:].filled(), other[name][:].filled())
+        assert list(first.variables) == list(other.variables)
+        for name in first.variables:
+            np.testing.assert_array_equal(first[name][:].filled(), other[name][:].filled())
         assert other.history.endswith("slipsweep run a.nc -o b.nc --quiet")
 
 

@@ -59,7 +59,7 @@ def told(*arguments: object, status: int = 0) -> str:
 def test_simulate_takes_units_and_says_what_it_took(
     typed: tuple[str, ...], same: tuple[str, ...], echo: str
 ) -> None:
-    first, other = (told(*BLOCK, *given) for given in (typed, same))
+    first, other = (told(*BLOCK, *options) for options in (typed, same))
     assert first == other
     assert "taken as                theta 5 degree, mu_s 0.38, " in first
     assert echo in first
@@ -68,15 +68,15 @@ def test_simulate_takes_units_and_says_what_it_took(
 
 def test_simulate_says_what_it_took_of_a_record(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("time (s),acceleration (g)\n0,0\n1,0.5\n2,-0.5\n3,0\n")
-    given = ("simulate", "--theta", "5", "--phi", "21", "--record", tmp_path / "a.csv")
+    command_line = ("simulate", "--theta", "5", "--phi", "21", "--record", tmp_path / "a.csv")
     taken = "taken as                theta 5 degree, mu_s 0.383864, phi 21 degree, scale {}, "
-    assert taken.format("1") + "time scale 1, polarity 1\n" in told(*given)
+    assert taken.format("1") + "time scale 1, polarity 1\n" in told(*command_line)
     typed = ("--scale", "2", "--polarity", "-1", "--time-scale", "0.5")
-    assert taken.format("2") + "time scale 0.5, polarity -1\n" in told(*given, *typed)
+    assert taken.format("2") + "time scale 0.5, polarity -1\n" in told(*command_line, *typed)
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("options", "message"),
     [
         (
             ("--amplitude", "high"),
@@ -89,12 +89,12 @@ def test_simulate_says_what_it_took_of_a_record(tmp_path: Path) -> None:
         (("--amplitude", "-0.1g"), "amplitude = -0.981"),
     ],
 )
-def test_a_unit_that_does_not_fit_is_refused(given: tuple[str, ...], message: str) -> None:
-    assert message in told(*BLOCK, *given, status=2)
+def test_a_unit_that_does_not_fit_is_refused(options: tuple[str, ...], message: str) -> None:
+    assert message in told(*BLOCK, *options, status=2)
 
 
 @pytest.mark.parametrize(
-    ("given", "flag"),
+    ("options", "flag"),
     [
         (
             ("--amplitude", "4", "--yield-acceleration", "-0.1g"),
@@ -105,9 +105,9 @@ def test_a_unit_that_does_not_fit_is_refused(given: tuple[str, ...], message: st
     ],
 )
 def test_simulate_without_a_value_says_why_and_fails(
-    tmp_path: Path, given: tuple[str, ...], flag: str
+    tmp_path: Path, options: tuple[str, ...], flag: str
 ) -> None:
-    message = told(*BLOCK, *given, "-o", tmp_path / "a.csv", status=1)
+    message = told(*BLOCK, *options, "-o", tmp_path / "a.csv", status=1)
     assert f"the model gives no value: {flag}" in message
     assert message.count("\n") == 1
     assert not (tmp_path / "a.csv").exists()
@@ -171,10 +171,10 @@ def test_run_and_info_say_what_motions_lack(
         assert "left_out_vertical: a-UP.txt (UP)" in out
     Path("b.toml").write_text(sweep.replace("[0.3, 2]", "[0.3]"))
     assert "scale factors" not in told("run", "b.toml", "-o", "low.nc")
-    one = sweep.replace('records = "m"', 'record = "m/weak.txt"')
-    Path("c.toml").write_text(one.replace("amplitude", "scale").replace("[0.3, 2]", "[1, 5]"))
+    single = sweep.replace('records = "m"', 'record = "m/weak.txt"')
+    Path("c.toml").write_text(single.replace("amplitude", "scale").replace("[0.3, 2]", "[1, 5]"))
     assert "scale factors above 4, up to 5; such motions" in told("run", "c.toml")
-    Path("d.toml").write_text(f'{one}excitation.vertical = "accept"\n')
+    Path("d.toml").write_text(f'{single}excitation.vertical = "accept"\n')
     message = told("run", "d.toml", status=2)
     assert "excitation.vertical: only beside excitation.records" in message
     Path("e.toml").write_text(f'{sweep}excitation.vertical = "accept"\n')

@@ -47,12 +47,12 @@ def test_a_sweep_file_gives_what_python_gives(folder: Path) -> None:
         model=slipsweep.Newmark(strength="weakening"),
         excitation=slipsweep.Sine(cycles=3),
     )
-    with slipsweep.open_result(folder / "liner.nc") as found:
+    with slipsweep.open_result(folder / "liner.nc") as result:
         for name in ("permanent_displacement", "validity"):
-            values = expected[name].transpose(*found[name].dims).values
-            np.testing.assert_allclose(found[name].values, values, rtol=1e-12)
-        assert found.attrs["strength"] == "weakening"
-        flags = slipsweep.flags(found)
+            values = expected[name].transpose(*result[name].dims).values
+            np.testing.assert_allclose(result[name].values, values, rtol=1e-12)
+        assert result.attrs["strength"] == "weakening"
+        flags = slipsweep.flags(result)
         assert flags.may_not_stop.any()
         assert flags.not_at_rest.any()
 

@@ -99,8 +99,8 @@ def test_a_table_has_every_cell_once(
         )
         np.testing.assert_array_equal(read_back, expected[name].to_numpy(read_back.dtype))
         if read_back.dtype == np.float32 and suffix != ".parquet":  # and no more
-            assert [f"{one:.9g}" for one in table[name]] == [
-                f"{float(str(one)):.9g}" for one in read_back
+            assert [f"{number:.9g}" for number in table[name]] == [
+                f"{float(str(number)):.9g}" for number in read_back
             ]
 
 
@@ -124,8 +124,8 @@ def test_a_dimension_that_no_variable_has_is_left_out(tmp_path: Path) -> None:
 def test_codes_are_spelled_out_on_request(folder: Path, tmp_path: Path) -> None:
     codes = tmp_path / "codes.csv"
     words = tmp_path / "words.csv"
-    for path, wanted in ((codes, False), (words, True)):
-        export.export(folder / "cases.nc", path, words=wanted)
+    for path, spelled_out in ((codes, False), (words, True)):
+        export.export(folder / "cases.nc", path, words=spelled_out)
     coded = bare(read(codes))
     worded = bare(read(words))
     assert list(worded["label"]) == ["mild ± slope, wet", "steep"] * 3
@@ -397,12 +397,12 @@ def test_texts_that_a_spreadsheet_computes_are_quoted_in_csv(tmp_path: Path, beg
 def test_accelerations_in_g(folder: Path, tmp_path: Path) -> None:
     export.export(folder / "grid.nc", tmp_path / "t.csv", in_g=True)
     export.export(folder / "grid.nc", tmp_path / "u.csv")
-    found = read(tmp_path / "t.csv")
+    frame = read(tmp_path / "t.csv")
     plain = read(tmp_path / "u.csv")
     np.testing.assert_allclose(
-        found["limiting_acceleration (g)"], plain["limiting_acceleration (m s-2)"] / 9.81, rtol=1e-6
+        frame["limiting_acceleration (g)"], plain["limiting_acceleration (m s-2)"] / 9.81, rtol=1e-6
     )
-    assert "permanent_displacement (m)" in found
+    assert "permanent_displacement (m)" in frame
 
 
 @pytest.mark.parametrize(

@@ -215,5 +215,5 @@ def test_complete_or_absent(tmp_path: Path) -> None:
         write(path, False, theirs="theirs")
     assert path.read_text() == "theirs"
     write(path, True)
-    assert [one.name for one in tmp_path.iterdir()] == ["a.txt"]
+    assert [file.name for file in tmp_path.iterdir()] == ["a.txt"]
     assert path.read_text() == "mine"

@@ -80,13 +80,13 @@ def test_stacked_coordinates_come_apart() -> None:
     grid = xr.Dataset(coords={"mu_s": ("mu_s", [0.3, 0.4]), "site": ("site", ["a", "b", "c"])})
     grid["theta"] = grid.mu_s * 0.0 + xr.DataArray([0.0, 5.0, 8.0], dims="site")
     cases = grid.stack(case=("mu_s", "site"))
-    found = call("sweep", theta=cases.theta, mu_s=cases.mu_s)
-    assert found.permanent_displacement.dims == ("case",)
-    assert found.site.values.tolist() == ["a", "b", "c"] * 2
-    np.testing.assert_array_equal(found.mu_s, np.repeat([0.3, 0.4], 3))
+    result = call("sweep", theta=cases.theta, mu_s=cases.mu_s)
+    assert result.permanent_displacement.dims == ("case",)
+    assert result.site.values.tolist() == ["a", "b", "c"] * 2
+    np.testing.assert_array_equal(result.mu_s, np.repeat([0.3, 0.4], 3))
     crossed = call("sweep", theta=grid.theta, mu_s=grid.mu_s).permanent_displacement
     np.testing.assert_array_equal(
-        found.permanent_displacement, crossed.transpose("mu_s", "site").values.ravel()
+        result.permanent_displacement, crossed.transpose("mu_s", "site").values.ravel()
     )
 
 
@@ -209,7 +209,7 @@ def test_friction_angles_that_are_none(phi: Any) -> None:
 
 def test_what_brings_a_unit_is_converted() -> None:
     unit: Any = pint.UnitRegistry()
-    for name, given, expected in (
+    for name, argument, expected in (
         ("amplitude", 0.3 * unit.standard_gravity, 0.3 * 9.80665),
         ("amplitude", unit.Quantity([10.0, 20.0], "cm/s**2"), [0.1, 0.2]),
         ("amplitude", xr.DataArray([0.1, 0.2], dims="x", attrs={"units": "g"}), [0.981, 1.962]),
@@ -218,13 +218,13 @@ def test_what_brings_a_unit_is_converted() -> None:
         ("frequency", 120.0 * unit.rpm, 2.0),
         ("displacement", 50.0 * unit.mm, 0.05),
     ):
-        np.testing.assert_allclose(check_values(name, given), expected, rtol=1e-14)
-    for name, given in (
+        np.testing.assert_allclose(check_values(name, argument), expected, rtol=1e-14)
+    for name, argument in (
         ("amplitude", 3.0 * unit.gram),
         ("mu_s", xr.DataArray(30.0, attrs={"units": "%"})),
     ):
         with pytest.raises(InputError, match=f"{name}: units = .* must be a unit that converts to"):
-            check_values(name, given)
+            check_values(name, argument)
 
 
 def test_where_u_is_defined_its_direction_is_said() -> None:

@@ -108,7 +108,7 @@ def test_figures_with_the_printed_decay_rate(
 
 
 @pytest.mark.parametrize(
-    ("experiment", "frequency", "given", "displacement", "newmark", "flags"),
+    ("experiment", "frequency", "inputs", "displacement", "newmark", "flags"),
     [
         (STICK_SLIP, 1.8, {"yield_acceleration": None}, "31.0", "31.0", Validity.YIELD_GOVERNS),
         (CONTINUOUS, 3.5, {"yield_acceleration": None}, "68.9", "64.3", Validity.YIELD_GOVERNS),
@@ -130,14 +130,14 @@ def test_figures_with_the_printed_decay_rate(
 def test_what_the_inputs_are_worth(
     experiment: dict[str, Any],
     frequency: float,
-    given: dict[str, Any],
+    inputs: dict[str, Any],
     displacement: str,
     newmark: str,
     flags: Validity,
 ) -> None:
     """Displacements of both experiments, measured, printed and estimated, and Newmark's; mm."""
     result = slipsweep.sweep(
-        **(experiment | given),
+        **(experiment | inputs),
         frequency=frequency,
         excitation=slipsweep.Sine(cycles=5),
         variables=["permanent_displacement", "newmark_displacement", "validity"],

@@ -397,11 +397,11 @@ def test_cosmos_with_several_channels(tmp_path: Path) -> None:
         InputError, match="channel = None: must be one of its 2 channels of acceleration"
     ):
         read_record(path)
-    found = [read_record(path, channel=number) for number in (1, 2)]
-    assert [float(record.acceleration[0]) for record in found] == pytest.approx(
+    channels = [read_record(path, channel=number) for number in (1, 2)]
+    assert [float(record.acceleration[0]) for record in channels] == pytest.approx(
         [0.000363, 0.77], rel=1e-15
     )
-    assert found[1].attrs["record_channel"] == "2"
+    assert channels[1].attrs["record_channel"] == "2"
 
 
 @pytest.mark.parametrize(

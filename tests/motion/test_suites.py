@@ -110,8 +110,8 @@ def test_measures_along_the_motions(folder: Path) -> None:
     np.testing.assert_allclose(suite.measures["motion_interval"], [0.02, 0.03, 0.01], rtol=1e-14)
     for at, record in enumerate(suite.components):
         for name, value in measures_by_sums(record.times, record.acceleration).items():
-            found = suite.measures[f"motion_{name}"][at]
-            assert found == pytest.approx(value, rel=1e-4, nan_ok=True), name
+            measure = suite.measures[f"motion_{name}"][at]
+            assert measure == pytest.approx(value, rel=1e-4, nan_ok=True), name
 
 
 @pytest.mark.parametrize(
@@ -165,7 +165,7 @@ def test_a_rotation_is_exact_at_the_quarters_and_straight_between_samples() -> N
     first = noise(1)
     second = noise(2)
     pair = Pair(first, second)
-    for quarter, sign, one in (
+    for quarter, sign, component in (
         (0, 1, first),
         (1, 1, second),
         (2, -1, first),
@@ -173,15 +173,17 @@ def test_a_rotation_is_exact_at_the_quarters_and_straight_between_samples() -> N
         (4, 1, first),
     ):
         np.testing.assert_array_equal(
-            pair.rotated(90.0 * quarter).acceleration, sign * one.acceleration
+            pair.rotated(90.0 * quarter).acceleration, sign * component.acceleration
         )
     # what stands at right angles has the rest of the energy
-    whole = sum(arias_intensity(one.times, one.acceleration) for one in (first, second))
+    whole = sum(
+        arias_intensity(component.times, component.acceleration) for component in (first, second)
+    )
     for azimuth in (10.0, 33.3, 77.0):
         both = (pair.rotated(azimuth), pair.rotated(azimuth + 90.0))
-        assert sum(arias_intensity(one.times, one.acceleration) for one in both) == pytest.approx(
-            whole, rel=1e-13
-        )
+        assert sum(
+            arias_intensity(component.times, component.acceleration) for component in both
+        ) == pytest.approx(whole, rel=1e-13)
         assert both[0] == Pair(first, second).rotated(azimuth)
 
 
