@@ -1,11 +1,15 @@
-"""The program, and the options of its commands: those that several take, and those that a choice declares."""
+"""The program, and options of its commands: shared ones, and those made from declarations.
+
+Options of parameters come from `model/parameter_table.py`, options of models, excitations and
+solvers from the classes of these choices.
+"""
 
 import functools
 import inspect
 import itertools
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, make_dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
@@ -13,9 +17,9 @@ import typer
 
 from slipsweep.errors import InputError
 from slipsweep.model.choices import Choice, Family, Option, declared
+from slipsweep.model.parameter_table import PARAMETER_TABLE, Parameter
 from slipsweep.model.parameters import check_values
 from slipsweep.model.units import quantity
-from slipsweep.model.variables import PARAMETERS
 
 #: The largest displacement that a number without a unit is taken for, m: more is likely to be meant
 #: in millimetres.
@@ -59,9 +63,34 @@ Texts = list[str] | None
 File = Path | None
 Paths = list[Path] | None
 
-THETA = BLOCK("Inclination of the base: 5 (degrees), 0.1rad.", "VALUE")
-MuS = Annotated[float | None, BLOCK("Static friction coefficient.")]
-Phi = Annotated[Text, BLOCK("Friction angle instead of --mu-s: 21 (degrees).", "VALUE")]
+
+def parameter_option(row: Parameter) -> Any:
+    """Return the option of a parameter of the table; one with a unit is typed as text."""
+    return Panel(row.panel)(row.option or "", None if row.units == "1" else "VALUE")
+
+
+def _parameter_type(row: Parameter) -> Any:
+    """Return the type of the option of a parameter, None if it is not typed."""
+    if row.units != "1":
+        return Text
+    return float | None if row.single_type == "float" else int | None
+
+
+_ROWS = {row.name: row for row in PARAMETER_TABLE if row.option}
+
+#: Options of all parameters of the table, as a dataclass that `command` takes apart.
+ParameterOptions = make_dataclass(
+    "ParameterOptions",
+    [
+        (row.name, Annotated[_parameter_type(row), parameter_option(row)], None)
+        for row in _ROWS.values()
+    ],
+    frozen=True,
+)
+
+THETA = parameter_option(_ROWS["theta"])
+MuS = Annotated[float | None, parameter_option(_ROWS["mu_s"])]
+Phi = Annotated[Text, parameter_option(_ROWS["phi"])]
 Overwrite = Annotated[bool, OUTPUT("Replace an output that exists.", None, "--overwrite")]
 Quiet = Annotated[bool, OUTPUT("No progress and no summary.", None, "--quiet", "-q")]
 Swept = Annotated[Path, read("OUT.nc", 'A result of "slipsweep run".')]
@@ -146,11 +175,11 @@ def compared(equations: str | None, magnitude: float | None) -> tuple[str, ...]:
 
 
 def in_own_units(typed: Mapping[str, Any], g: float) -> dict[str, Any]:
-    """Those of the parameters that were typed as text, in their own units."""
+    """Return the parameters that were typed as text, as numbers in their own units."""
     return {
-        name: quantity(option_name(name), text, about["units"], g)
-        for name, about in PARAMETERS.items()
-        if isinstance(text := typed.get(name), str)
+        row.name: quantity(option_name(row.name), text, row.units, g)
+        for row in PARAMETER_TABLE
+        if isinstance(text := typed.get(row.name), str)
     }
 
 

@@ -165,12 +165,12 @@ def run(
 
 def _scaling_caution(spec: "SweepSpec") -> str | None:
     """A line on recorded motions that are scaled by large factors; None where none is."""
-    from slipsweep.grid.inputs import Inputs
     from slipsweep.grid.plans import plan_sweep
 
-    # the factor depends on these alone; a block has to be given, whichever it is
-    names = (*variables.STRENGTHS, "time_scale", "azimuth")
-    inputs = Inputs(theta=0.0, mu_s=1.0, **{name: getattr(spec.inputs, name) for name in names})
+    # the factor depends on these alone; the plan also needs a block, and any will do
+    needed = (*variables.STRENGTHS, "time_scale", "azimuth")
+    inputs = {name: values for name, values in spec.inputs.items() if name in needed}
+    inputs |= {"theta": 0.0, "mu_s": 1.0}
     plan = plan_sweep(inputs, excitation=spec.excitation, variables=["motion_factor"])
     factors = plan.solve()["motion_factor"]
     largest = factors.max(set(factors.dims) - {"motion"})

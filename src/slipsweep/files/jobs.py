@@ -2,8 +2,8 @@
 
 import hashlib
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -15,6 +15,7 @@ from slipsweep.errors import InputError
 from slipsweep.files.motions import digest_of
 from slipsweep.files.netcdf import described
 from slipsweep.files.spec import SweepSpec, named
+from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.plans import Plan
 from slipsweep.model.options import slides_both_ways
 from slipsweep.model.variables import RESULT_DTYPES, STRENGTHS
@@ -96,6 +97,11 @@ def sweep_job(spec: SweepSpec) -> Job:
     )
 
 
+def _without(inputs: Inputs, names: Collection[str]) -> Inputs:
+    """Return the inputs without some of them."""
+    return {name: values for name, values in inputs.items() if name not in names}
+
+
 def limit_job(
     spec: SweepSpec, displacement: float | list[float], maximum_amplitude: float | None = None
 ) -> Job:
@@ -109,7 +115,7 @@ def limit_job(
             )
         plan = plan_limits(
             displacement,
-            replace(spec.inputs, **dict.fromkeys(("displacement_amplitude", *STRENGTHS))),
+            _without(spec.inputs, ("displacement_amplitude", *STRENGTHS)),
             excitation=spec.excitation,
             model=spec.model,
             maximum_amplitude=maximum_amplitude,
@@ -122,17 +128,15 @@ def strength_job(spec: SweepSpec, displacement: float | list[float], of: str) ->
     """Return the job of `slipsweep limit --of`: strengths that displacements (m) require."""
     from slipsweep.studies import strength  # imports numba
 
-    # the strength is solved for; without θ the yield coefficient needs no interface
-    replaced = dict.fromkeys(("mu_s", "phi", "yield_acceleration", "yield_coefficient"))
-    both_ways = slides_both_ways(spec.model)
-    if of == "yield_coefficient" and not both_ways:
-        replaced |= dict.fromkeys(("theta",))
-    replaced |= dict.fromkeys(("structure_frequency", "decay_rate", "delta_mu"))
-    replaced |= dict.fromkeys(("minimum_friction",))
+    # the strength is solved for, and the parameters of the paper's friction law play no part
+    dropped = ["mu_s", "phi", "yield_acceleration", "yield_coefficient"]
+    dropped += ["decay_rate", "delta_mu", "minimum_friction", "structure_frequency"]
+    if of == "yield_coefficient" and not slides_both_ways(spec.model):
+        dropped.append("theta")  # a yield coefficient needs no interface
     with named(spec.source):
         plan = strength.plan_strength(
             displacement,
-            replace(spec.inputs, **replaced),
+            _without(spec.inputs, dropped),
             of=of,
             excitation=spec.excitation,
             model=spec.model,

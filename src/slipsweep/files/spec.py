@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files import motions, opening
-from slipsweep.grid.inputs import Inputs
+from slipsweep.grid.inputs import Inputs, given_inputs
 from slipsweep.model import choices, options, parameters, units, variables
 from slipsweep.motion import reading, records, suites
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform
@@ -29,22 +29,6 @@ if TYPE_CHECKING:
 
 #: Inputs that [axes] and [[cases]] may give; `polarity` is one of [excitation].
 _INPUTS = tuple(name for name in variables.PARAMETERS if name != "polarity")
-
-#: Parameters that [model] may give as one number for the whole sweep.
-_MODEL_PARAMETERS = (
-    "yield_acceleration",
-    "yield_coefficient",
-    "upslope_yield_acceleration",
-    "decay_rate",
-    "delta_mu",
-    "minimum_friction",
-    "residual_mu",
-    "residual_phi",
-    "weakening_distance",
-    "fast_mu",
-    "rate_constant",
-    "structure_frequency",
-)
 
 #: Tables that are a choice with its options.
 _FAMILIES: tuple[choices.Family[Any], ...] = (options.MODELS, WAVEFORMS, options.SOLVERS)
@@ -90,7 +74,7 @@ KEYS: dict[str, dict[str, Any]] = {
     | {"thresholds": [0.01, 0.1, 1.0], "correlation": [], "sensitivity": False, "over": []}
     | dict.fromkeys(variables.DRAWN),
 }
-KEYS["model"] |= dict.fromkeys(_MODEL_PARAMETERS) | {"yield_acceleration": "coulomb"}
+KEYS["model"] |= dict.fromkeys(variables.MODEL_INPUTS) | {"yield_acceleration": "coulomb"}
 KEYS["excitation"] |= dict.fromkeys(_RECORD_KEYS) | {"polarity": 1}
 
 #: Largest number of points on one axis: 80 MB of coordinates, more than any grid can use.
@@ -130,7 +114,7 @@ class SweepSpec:
         """Coordinates by which cells of the result differ, and parameters with one value."""
         over = () if self.sampling is None else self.sampling.over
         grid = {}
-        for name, value in self.inputs.given.items():
+        for name, value in self.inputs.items():
             values = [1, -1] if isinstance(value, str) else value  # polarity = "both"
             grid[name] = (
                 values
@@ -262,7 +246,9 @@ def parse(
         tables = {name: dict(_known(name, content.get(name, {}), KEYS[name])) for name in names}
         _known("", content, (*names, "cases"))
         numbers = {
-            name: tables["model"].pop(name) for name in _MODEL_PARAMETERS if name in tables["model"]
+            name: tables["model"].pop(name)
+            for name in variables.MODEL_INPUTS
+            if name in tables["model"]
         }
         if numbers.get("yield_acceleration") == "coulomb":
             del numbers["yield_acceleration"]
@@ -289,7 +275,16 @@ def parse(
         solver = options.solver_for(model, "auto" if is_default else chosen)
         output = _output(tables["output"], sampling is not None)
         return SweepSpec(
-            source, text, Inputs(**given), labels, model, motion, solver, output, sampling, files
+            source,
+            text,
+            given_inputs(given),
+            labels,
+            model,
+            motion,
+            solver,
+            output,
+            sampling,
+            files,
         )
 
 

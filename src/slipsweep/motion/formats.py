@@ -9,7 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from slipsweep.errors import InputError
-from slipsweep.model.parameters import LARGEST, check_choice
+from slipsweep.model.parameter_table import LARGEST
+from slipsweep.model.parameters import check_choice
 from slipsweep.motion.columns import chosen_channel, read_plain
 from slipsweep.motion.foreign import text_refusal
 from slipsweep.motion.headings import unit_said

@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from slipsweep.errors import InputError
-from slipsweep.model.parameters import LARGEST, shown
+from slipsweep.model.parameter_table import LARGEST
+from slipsweep.model.parameters import shown
 from slipsweep.motion.foreign import binary_refusal
 from slipsweep.motion.intensity import Floats
 

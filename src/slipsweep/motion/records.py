@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.model.parameters import LARGEST, check_choice, check_numbers, check_single, shown
+from slipsweep.model.parameter_table import LARGEST
+from slipsweep.model.parameters import check_choice, check_numbers, check_single, shown
 from slipsweep.motion import formats
 from slipsweep.motion.headings import vertical_mark
 from slipsweep.motion.intensity import Floats, peak_displacement, peak_velocity
