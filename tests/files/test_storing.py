@@ -19,7 +19,7 @@ from slipsweep.errors import InputError, RunError
 from slipsweep.files import running, spec, storing
 from slipsweep.files.jobs import Job, limit_job, sweep_job
 from slipsweep.files.opening import read_result
-from slipsweep.grid.tally import tally_of
+from slipsweep.studies.result_counts import tally_of
 from tests.support.commands import command
 from tests.support.made_up_records import write_motion
 

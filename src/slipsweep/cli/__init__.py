@@ -16,7 +16,7 @@ import typer
 from typer.core import TyperGroup
 
 from slipsweep._version import __version__
-from slipsweep.cli import calibrate, chart, hazard, info, limit, run, simulate
+from slipsweep.cli import calibrate, chart, export, hazard, info, limit, run, simulate
 from slipsweep.cli.common import echo
 from slipsweep.cli.letters import SPELL
 from slipsweep.cli.options import app
@@ -106,7 +106,7 @@ def _options(
 
 
 #: Modules of the commands, in the order of the help.
-_MODULES = [one.__name__ for one in (run, simulate, limit, hazard, chart, info, calibrate)]
+_MODULES = [one.__name__ for one in (run, simulate, limit, hazard, chart, info, export, calibrate)]
 app.registered_commands.sort(
     key=lambda one: _MODULES.index(one.callback.__module__ if one.callback else "")
 )

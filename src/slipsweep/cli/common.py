@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from slipsweep.files.jobs import Job
     from slipsweep.files.running import Report
     from slipsweep.files.storing import Place
-    from slipsweep.grid.tally import Tally
     from slipsweep.motion.records import Record
+    from slipsweep.studies.result_counts import Tally
 
 #: Attribute of a file that says what no design must rest on, a line for each reason.
 UNSOUND = "unsound"

@@ -19,7 +19,6 @@ from slipsweep.files.opening import read_result, result_names, values_text
 from slipsweep.files.outputs import check_endings, check_outputs, complete_or_absent
 from slipsweep.files.selection import axis_values, places_at
 from slipsweep.grid.chunks import grid_chunks
-from slipsweep.grid.tally import tally_of
 from slipsweep.model.variables import (
     LIMIT_RESULTS,
     MOTION_FILES,
@@ -28,6 +27,7 @@ from slipsweep.model.variables import (
     UNFLAGGED_TEXT,
 )
 from slipsweep.studies.published_statistics import published_table
+from slipsweep.studies.result_counts import tally_of
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -28,7 +28,7 @@ from slipsweep.files.storing import Chunks, Place, ZarrChunks
 from slipsweep.grid.chunks import CHUNK_CELLS, chunk_lengths
 from slipsweep.grid.plans import Plan
 from slipsweep.grid.resources import size_text
-from slipsweep.grid.tally import Tally, tally_of
+from slipsweep.studies.result_counts import Tally, tally_of
 
 if TYPE_CHECKING:
     from distributed import Client
