@@ -84,7 +84,7 @@ def run_job(
     with progress_bar(job.plan.cells, large.quiet, unit) as progress:
         given |= {"progress": progress, "remarks": remarks}
         report = running.run(job, path, command=typed_command(), **given)
-    if report.found and not large.quiet:
+    if report.was_complete and not large.quiet:
         echo(f"{path}: complete already, by the same sweep; nothing was computed")
     return report
 

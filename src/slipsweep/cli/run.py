@@ -124,7 +124,7 @@ def run(
     if large.quiet:
         return
     template = job.plan.template()
-    if not report.found:
+    if not report.was_complete:
         cells = job.plan.cells
         grid = grid_text(job.plan.sizes) or "no axes"
         passed = time.perf_counter() - started - judged

@@ -1,9 +1,9 @@
 """Solution of a grid: variables with named dimensions in, variables out.
 
 A grid is cut into tiles of some thousand cells, which threads solve.  NumPy gathers the inputs of a
-tile into an array of cells, and a kernel solves it (`slipsweep.grid.solvers`).  The kernel's results
-of a cell are in units of phase; the scaling law, v = V/ω and u = W/ω², gives those at all
-frequencies of the cell.
+tile into an array of cells, and a kernel solves it (`slipsweep.grid.solvers`).  The results of the
+kernel are in units of phase; the scaling law, v = V/ω and u = W/ω², gives those at all frequencies
+of a cell.
 """
 
 import math
@@ -130,7 +130,7 @@ def friction_parameters(request: Request, finite: bool = True) -> Variables:
 
 
 def amplitudes(request: Request) -> Variables:
-    """Return the amplitude of every cell: A = ω²d of a waveform, the factor on a recorded motion."""
+    """Return the amplitude of every cell: A = ω²d of a waveform, or the factor on a record."""
     results = request.results()
     for where, part in motions(request):
         for result in results.values():
@@ -247,7 +247,7 @@ def _scaled_dimension(request: Request) -> str | None:
 def _fill(
     results: Variables, request: Request, solver: solvers.Solver, finite: bool = True
 ) -> None:
-    """Fill in the results, tile by tile, from NumPy arrays: indexing xarray for each tile is slow."""
+    """Fill in the results tile by tile, from NumPy arrays, as cutting xarray variables is slow."""
     scaled = _scaled_dimension(request)
     dims = tuple(request.sizes)
     solved = {dim: size for dim, size in request.sizes.items() if dim != scaled}

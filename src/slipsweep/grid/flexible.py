@@ -1,4 +1,4 @@
-"""The flag `flexible_block`: blocks that are not rigid, as their structure responds to the shaking."""
+"""The flag `flexible_block` of blocks that are not rigid, as their structure responds."""
 
 from typing import Any
 

@@ -44,7 +44,8 @@ from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform, peak_acceleration
 
-#: Results on the same dimensions: a function that solves them, such as `engine.solve`, and its request.
+#: Results on the same dimensions: a function that solves them, such as `engine.solve`, and its
+#: request.
 Task: TypeAlias = tuple[Callable[[engine.Request], engine.Variables], engine.Request]
 
 
@@ -119,13 +120,13 @@ class Plan:
         )
 
     def lazy(self, lengths: Mapping[str, tuple[int, ...]]) -> xr.Dataset:
-        """Return the results as dask arrays in chunks of these lengths; they are not computed yet."""
+        """Return the results as dask arrays in chunks of these lengths, not yet computed."""
         import dask.array as da  # loading it takes as long as xarray
 
         if not lengths:  # one cell
             return self.solve()
-        # an array with one element for each chunk of the grid: a Dataset of all results, so that one
-        # task solves the chunk
+        # an array with one element for each chunk of the grid: a Dataset of all results, so that
+        # one task solves the chunk
         ones = tuple((1,) * len(cuts) for cuts in lengths.values())
         meta = np.empty((0,) * len(ones), object)
         solved = da.map_blocks(

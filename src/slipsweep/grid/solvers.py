@@ -103,7 +103,7 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
 
 
 def sine_solver(motion: Sine, options: block.Options) -> Solver:
-    """Return the solver of the paper's block under a plain sine: batches, and the walk for others."""
+    """Return the solver of the paper's block under a plain sine: batches, then the walk."""
 
     def solve(cells: np.ndarray, results: np.ndarray) -> None:
         if solve_sine(cells, options, results):
@@ -261,7 +261,7 @@ def cost_of(problem: Problem) -> int:
 
 
 def memory_of(problem: Problem) -> int:
-    """Return the bytes that the tables of pieces of recorded motions take while cells are solved."""
+    """Return the bytes of the tables of pieces of recorded motions while cells are solved."""
     motion = problem.excitation
     if isinstance(motion, Waveform):
         return 0

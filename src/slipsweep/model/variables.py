@@ -145,8 +145,8 @@ class Validity(IntFlag):
         2048,
         FlagKind.CAUTION,
         (
-            "residual_mu or fast_mu <= tan(theta): once it slides, the block may not stop under its "
-            "own weight"
+            "residual_mu or fast_mu <= tan(theta): once it slides, the block may not stop under "
+            "its own weight"
         ),
     )
     NOT_AT_REST = (
