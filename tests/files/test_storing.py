@@ -86,109 +86,6 @@ def test_a_store_is_compressed(folder: Path, compressed: Path) -> None:
     assert codec.to_dict()["configuration"]["level"] == 4
 
 
-<<<<<<< HEAD
-@pytest.mark.parametrize("output", ["a[1].nc", "a[1].zarr"])
-def test_a_run_goes_on_with_its_own_chunks_only(
-    folder: Path, output: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(running, "CHUNK_CELLS", 6)
-    path = folder / output
-    mark = storing._mark
-    seen = []
-
-    def failing(place: str, number: int) -> None:
-        if number == 3:
-            raise OSError(28, "No space left on device")
-        noting(place, number)
-
-    def noting(place: str, number: int) -> None:
-        seen.append(number)
-        mark(place, number)
-
-    monkeypatch.setattr(storing, "_mark", failing)
-    with pytest.raises(RunError, match="No space") as failure:
-        stored(job_of(folder, "sweep"), path)
-    assert failure.value.__notes__ == [f"3 of 24 chunks are kept in {path}.part: --resume goes on"]
-    assert not path.exists()
-    monkeypatch.setattr(storing, "_mark", noting)
-
-    with pytest.raises(
-        InputError,
-        match=r"part: has chunks of an interrupted run; give --resume to go on with them, or --ov",
-    ):
-        stored(job_of(folder, "sweep"), path)
-    with pytest.raises(InputError, match="has chunks of another sweep file; go on with that one"):
-        stored(job_of(folder, "newmark"), path, resume=True)
-    monkeypatch.setattr("slipsweep.files.jobs.__version__", "9.9")
-    with pytest.raises(InputError, match="another version of slipsweep"):
-        stored(job_of(folder, "sweep"), path, resume=True)
-    monkeypatch.undo()
-    monkeypatch.setattr(storing, "_mark", noting)
-
-    identity = folder / f"{output}.part" / "identity.json"
-    kept = identity.rename(folder / "kept.json")
-    identity.mkdir()  # what cannot be read is not taken for nothing: the chunks stay
-    with pytest.raises(RunError, match="writing failed: Is a directory"):
-        stored(job_of(folder, "sweep"), path, resume=True)
-    identity.rmdir()
-    with pytest.raises(InputError, match="has chunks that nothing identifies"):
-        stored(job_of(folder, "sweep"), path, resume=True)
-    kept.rename(identity)
-    monkeypatch.setattr(running, "CHUNK_CELLS", 2)  # as with workers
-    assert not stored(
-        job_of(folder, "sweep"), path, resume=True
-    ).was_complete  # with the chunks it was begun with
-    assert sorted(seen) == list(range(24))
-    stored(job_of(folder, "sweep"), folder / "whole.nc")
-    xr.testing.assert_identical(
-        without_time(read_result(path)), without_time(read_result(folder / "whole.nc"))
-    )
-
-    assert stored(job_of(folder, "sweep"), path, resume=True).was_complete
-    with pytest.raises(InputError, match="is of another sweep or version; give --overwrite"):
-        stored(job_of(folder, "newmark"), path, resume=True)
-    with pytest.raises(InputError, match="exists already; give --overwrite"):
-        stored(job_of(folder, "sweep"), path)
-    stored(job_of(folder, "newmark"), path, overwrite=True)
-    assert read_result(path).attrs["model"] == "newmark"
-
-
-def test_a_run_goes_on_with_other_memory_if_its_chunks_fit(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Chunks keep the size that the run was begun with; less memory than they take is refused."""
-    monkeypatch.setattr(running, "_BASE_MEMORY", 0)
-    monkeypatch.setattr(running, "CHUNK_CELLS", 100)  # without a limit; else cells fill the memory
-    cell = 2 * (8 + 8 + 1 + 2) + 8  # two copies of the default results, and 8 bytes
-    (folder / "sweep.toml").write_text(WAVE.replace("num = 4", "num = 400"))
-    path = folder / "a.nc"
-    mark = storing._mark
-
-    def failing(place: str, number: int) -> None:
-        if number == 2:
-            raise OSError(28, "No space left on device")
-        mark(place, number)
-
-    monkeypatch.setattr(storing, "_mark", failing)
-    with pytest.raises(RunError, match="No space"):
-        stored(job_of(folder, "sweep"), path, memory=2400 * cell)
-    marked: list[int] = []
-    monkeypatch.setattr(storing, "_mark", lambda place, number: marked.append(number))
-    with pytest.raises(
-        InputError, match="larger chunks than fit into the memory asked for; give more --memory"
-    ):
-        stored(job_of(folder, "sweep"), path, resume=True, memory=1000 * cell)
-    assert not stored(job_of(folder, "sweep"), path, resume=True, memory=7200 * cell).was_complete
-    assert marked == [2]
-    monkeypatch.undo()
-    stored(job_of(folder, "sweep"), folder / "whole.nc")
-    xr.testing.assert_identical(
-        without_time(read_result(path)), without_time(read_result(folder / "whole.nc"))
-    )
-
-
-=======
->>>>>>> page
 @pytest.mark.parametrize("workers", [0, 1, 4])
 def test_chunks_on_the_way_from_workers_count_as_memory(folder: Path, workers: int) -> None:
     """Each worker solves one and two wait for it, beside two here; never more than asked for."""
@@ -261,25 +158,16 @@ def test_workers_give_the_same_bits(folder: Path, output: str) -> None:
 
 def test_a_store_at_an_address_has_the_same_result(folder: Path) -> None:
     address = "memory://bucket/address.zarr"
-<<<<<<< HEAD
-    stored(job_of(folder, "sweep"), address)
-    stored(job_of(folder, "sweep"), folder / "a.nc")
-    xr.testing.assert_identical(
-        without_time(read_result(address)), without_time(read_result(folder / "a.nc"))
-    )
-    assert stored(job_of(folder, "sweep"), address, resume=True).was_complete
-=======
     run(job_of(folder, "sweep"), address)
     run(job_of(folder, "sweep"), folder / "a.nc")
     assert_same_result(address, folder / "a.nc")
->>>>>>> page
     assert not list(Path().glob(".address*"))
 
 
 def test_a_store_at_an_address_is_found_complete(folder: Path) -> None:
     address = "memory://bucket/complete.zarr"
     run(job_of(folder, "sweep"), address)
-    assert run(job_of(folder, "sweep"), address, resume=True).found
+    assert run(job_of(folder, "sweep"), address, resume=True).was_complete
 
 
 def test_an_address_of_an_unknown_protocol_is_refused(folder: Path) -> None:
