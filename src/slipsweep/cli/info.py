@@ -23,7 +23,7 @@ def info(
     equations: options.Equations = None,
     magnitude: options.Magnitude = None,
 ) -> None:
-    """Show what a result holds, how it was made, its shares of flags, and the statistics of a suite."""
+    """Show what a result holds, how it was made, shares of flags, and statistics of a suite."""
     from slipsweep.charts import solved
     from slipsweep.files import jobs, motions, opening, selection, storing
     from slipsweep.motion.records import Record

@@ -65,12 +65,12 @@ def simulate(
         recorded = None if record is None else read_record(record, **reading)
     except InputError as error:  # options as they are typed: --gaps linear for gaps = 'linear'
         raise InputError(re.sub(r"\b(\w+) = '([^']*)'", r"--\1 \2", str(error))) from None
-    given: dict[str, Any] = {
+    arguments: dict[str, Any] = {
         **vars(typed),
         **with_unit,
         "excitation": recorded or excitation or WAVEFORMS.default,
     }
-    table = simulated(**given, model=model, points_per_cycle=points)
+    table = simulated(**arguments, model=model, points_per_cycle=points)
     taken_as = _taken_as(table, model.g)
     validity = variables.Validity(table["validity"].item())
     if flags := validity & variables.VALUELESS:
@@ -107,9 +107,8 @@ def simulate(
         echo(f"{'clearance':<23} {extent.item():.6g} m")
     echo(f"peak relative velocity  {table['peak_relative_velocity'].item():.6g} m/s")
     if "sliding_mode" in table:
-        echo(
-            f"sliding mode            {variables.SlidingMode(table['sliding_mode'].item()).name.lower()}"
-        )
+        mode = variables.SlidingMode(table["sliding_mode"].item())
+        echo(f"sliding mode            {mode.name.lower()}")
     counts = (name for name in variables.RECORD_COUNTS if name in table)
     echo(*(f"{name.replace('_', ' '):<24}{table[name].item()}" for name in counts))
     echo(f"inputs                  {table.attrs['friction_inputs']}")
@@ -124,7 +123,7 @@ def simulate(
 
 
 def _taken_as(table: "xr.Dataset", g: float) -> str:
-    """Parameters of a time history with their units, also those that were not typed."""
+    """Return the parameters of a time history with their units, also those not typed."""
     texts = (
         f"{name if name == 'mu_s' else name.replace('_', ' ')} "
         f"{common.range_text(name, [table[name].item()], g)}"

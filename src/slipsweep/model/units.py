@@ -80,7 +80,8 @@ def quantity(key: str, text: str, target_unit: str, g: float) -> float:
     """
     match = re.fullmatch(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*", text)
     refusal = InputError(
-        f"{key} = {show(text)}: must be a number, with a unit that converts to {target_unit} if in another"
+        f"{key} = {show(text)}: must be a number, with a unit that converts to {target_unit} if in "
+        "another"
     )
     if match is None or math.isinf(float(match[1])):
         raise refusal
