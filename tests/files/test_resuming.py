@@ -1,4 +1,4 @@
-"""Interrupted runs: which chunks they keep, who may go on with them, and that the result is whole."""
+"""Interrupted runs keep chunks, with which the same run may go on to the same result."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -113,8 +113,8 @@ def test_too_little_memory_is_refused(folder: Path) -> None:
         run(job_of(folder, "sweep"), folder / "a.nc", memory=100_000_000)
 
 
-#: Runs the command in a process, and prints its memory at the peak, kB: that of getrusage begins with
-#: the memory of its parent.
+#: Runs the command in a process, and prints its memory at the peak, kB: that of getrusage begins
+#: with the memory of its parent.
 PEAK_MEMORY = """
 import sys
 from pathlib import Path
