@@ -90,12 +90,17 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
         path = cutting.path_of_waveform(motion)
         solve_walk(cells, options, path, *workspace_of(), results)
 
+    def solve_alone(cells: np.ndarray, results: np.ndarray) -> None:
+        solve_sine(cells, options, True, results)
+
     def under_sine(cells: np.ndarray, results: np.ndarray) -> None:
-        if solve_sine(cells, options, results):
+        solve_sine(cells, options, False, results)
+        for solve_others in (solve_alone, under_wave):
             left = np.flatnonzero(results[ROWS["validity"]] == physics.UNSOLVED)
-            found = np.empty((len(physics.Motion._fields), left.size))
-            under_wave(cells[left], found)
-            results[:, left] = found
+            if left.size:
+                others = np.empty((len(physics.Motion._fields), left.size))
+                solve_others(cells[left], others)
+                results[:, left] = others
 
     if isinstance(problem.solver, Step):
         stepper = stepper_of(problem, options, polarity)
@@ -128,9 +133,10 @@ def newmark_solver(problem: Problem, options: physics.Options, polarity: float) 
         newmark.solve_newmark(cells, options.g, options.wants_peak, path, blocks, results)
 
     def solve_in_batches(cells: np.ndarray, results: np.ndarray) -> None:
-        if not solve_sine(cells, options, results):
-            return
+        solve_sine(cells, options, False, results)
         left = np.flatnonzero(results[ROWS["validity"]] == physics.UNSOLVED)
+        if not left.size:
+            return
         others = np.full(left.size, math.nan, newmark.NEWMARK_CELL)
         for name in newmark.DOWNSLOPE_FIELDS:
             others[name] = cells[name][left]
