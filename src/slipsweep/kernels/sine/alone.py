@@ -13,7 +13,7 @@ import math
 from enum import IntEnum
 from typing import NamedTuple
 
-from slipsweep.jit.decorators import scalar, single
+from slipsweep.jit.decorators import inlined, scalar, single
 from slipsweep.jit.elementary import rising_phase, versine
 from slipsweep.kernels.block import (
     KD_NOT_POSITIVE,
@@ -132,9 +132,10 @@ root = root_of(_quantity)
 
 @scalar
 def find_places(batch: Batch, j: int, start: float, end: float, g: float) -> None:
-    """Set `places` of cell j to Üg on the way from `start` to `end` where E or D turns, or D is 0.
+    """Set `places` of cell j to Üg on the way from `start` to `end` where E turns or D is 0.
 
-    Both ends are places, too; `last_place` is the number of the last.
+    Both ends are places, too; `last_place` is the number of the last.  Of each `phases` has ψ, and
+    `responses` E.
     docs/numerics.md#slope-and-inflection
     """
     places = batch.places[j]
@@ -142,11 +143,10 @@ def find_places(batch: Batch, j: int, start: float, end: float, g: float) -> Non
     last = 0
     bend = law.exponential_inflection(batch.tan_theta[j], batch.decay_rate[j], g)
     low = start
-    for high in (bend if start < bend < end else start, end):
-        if high == low:
-            continue
+    lag, slope = relative_acceleration(batch, j, start, g)
+    for high in (bend if start < bend < end else end, end):
         # between these two dE/dx is monotone: E turns where it is 0, D where it is 1
-        before = 1.0 - relative_acceleration(batch, j, low, g)[1]
+        before = 1.0 - slope
         after = 1.0 - relative_acceleration(batch, j, high, g)[1]
         nearer = 1.0 if before > after else 0.0
         for turn in (nearer, 1.0 - nearer, math.inf):
@@ -157,17 +157,26 @@ def find_places(batch: Batch, j: int, start: float, end: float, g: float) -> Non
                 where = (batch, j, Quantity.SLOPE, turn, 0.0, g)
                 below, above = (low, high) if before < after else (high, low)
                 x = root(where, below, above, high, 0.0)
-            lag = relative_acceleration(batch, j, places[last], g)[0]
-            lag_at_x = relative_acceleration(batch, j, x, g)[0]
-            if min(lag, lag_at_x) < 0.0 < max(lag, lag_at_x):
+            lag_before = lag
+            lag, slope = relative_acceleration(batch, j, x, g)
+            if min(lag_before, lag) < 0.0 < max(lag_before, lag):
                 where = (batch, j, Quantity.RELATIVE_ACCELERATION, 0.0, 0.0, g)
-                below, above = (places[last], x) if lag < 0.0 else (x, places[last])
-                places[last + 1] = root(where, below, above, x, 0.0)
+                below, above = (low, x) if lag_before < 0.0 else (x, low)
                 last += 1
-            places[last + 1] = x
-            last += 1
-        low = high
+                places[last] = root(where, below, above, x, 0.0)
+            if turn == 0.0:
+                last += 1
+                places[last] = x
+            low = x
+        if high == end:
+            break
+    last += 1
+    places[last] = end
     batch.last_place[j] = last
+    amplitude = batch.amplitude[j]
+    for i in range(last + 1):
+        batch.phases[j, i] = rising_phase(abs(places[i]), amplitude)
+        batch.responses[j, i] = places[i] - relative_acceleration(batch, j, places[i], g)[0]
 
 
 # ----------------------------------------------------------------------------------- stick-slip
@@ -177,82 +186,91 @@ def find_places(batch: Batch, j: int, start: float, end: float, g: float) -> Non
 def rise_alone(batch: Batch, j: int, options: Options) -> None:
     """Go from Üg = Üy, with V = `entered`, to the peak: V, W, and b there (`held`).
 
-    V = 0 at the peak is a block at rest.
+    V = 0 at the peak is a block at rest.  docs/model.md#motion
     """
     g = options.g
     literal = options.rise == LITERAL
     amplitude = batch.amplitude[j]
     yield_acceleration = batch.yield_acceleration[j]
-    response = yield_acceleration - relative_acceleration(batch, j, yield_acceleration, g)[0]
-    governs = not literal and response <= yield_acceleration
-    held = response if literal else max(response, yield_acceleration)
-    slides = batch.entered[j] > 0.0
-    batch.velocity[j] = batch.entered[j]
-    batch.displacement[j] = 0.0
-    batch.least_velocity[j] = batch.entered[j]
+    velocity = batch.entered[j]
+    displacement = 0.0
+    slides = velocity > 0.0
+    least = velocity
+    held = batch.responses[j, 0] if literal else max(batch.responses[j, 0], yield_acceleration)
     for i in range(int(batch.last_place[j])):
+        start = batch.phases[j, i]
+        end = batch.phases[j, i + 1]
         x = batch.places[j, i]
-        x_end = batch.places[j, i + 1]
-        start = batch.yield_phase[j] if i == 0 else rising_phase(x, amplitude)
-        end = rising_phase(x_end, amplitude)
+        response = batch.responses[j, i]
+        response_at_end = batch.responses[j, i + 1]
         middle = amplitude * (1.0 - versine(0.5 * (start + end)))
         advances = relative_acceleration(batch, j, middle, g)[0] > 0.0
-        response_at_end = x_end - relative_acceleration(batch, j, x_end, g)[0]
-        governs &= response_at_end <= yield_acceleration
         while slides or advances:
-            response = x - relative_acceleration(batch, j, x, g)[0]
             if not slides:
                 # t1; where D = 0, E is x but for rounding
                 onset = response if literal else max(response, yield_acceleration)
-                held = x if i > 0 and x == batch.places[j, i] else min(onset, x)
+                held = x if i > 0 and start == batch.phases[j, i] else min(onset, x)
                 slides = True
-                batch.least_velocity[j] = 0.0
+                least = 0.0
             switch = end
             if literal or response_at_end > held:
                 switch = start
                 if not literal and response < held:
                     where = (batch, j, Quantity.RESPONSE, held, 0.0, g)
+                    x_end = batch.places[j, i + 1]
                     switch = rising_phase(root(where, x, x_end, x_end, 0.0), amplitude)
-            # b is held: V falls up to Üg = b
-            turn = min(max(rising_phase(held, amplitude), start), switch)
-            velocity = batch.velocity[j]
-            least = velocity + held_gains(amplitude, held, start, turn)[0]
-            batch.least_velocity[j] = min(batch.least_velocity[j], least)
-            if velocity > 0.0 and least <= 0.0:
-                where = (batch, j, Quantity.VELOCITY_HELD, held, start, g)
-                stop = root(where, turn, start, turn, start)
-                moved = held_gains(amplitude, held, start, stop)[1]
-                batch.displacement[j] += velocity * (stop - start) + moved
-                batch.velocity[j] = 0.0
-                slides = False
-                start = stop
-                x = amplitude * (1.0 - versine(stop))
-                continue
+            # b is held; V falls up to Üg = b
+            if velocity > 0.0:
+                turn = min(max(rising_phase(held, amplitude), start), switch)
+                slowest = velocity + held_gains(amplitude, held, start, turn)[0]
+                least = min(least, slowest)
+                if slowest <= 0.0:
+                    batch.velocity[j] = velocity
+                    where = (batch, j, Quantity.VELOCITY_HELD, held, start, g)
+                    stop = root(where, turn, start, turn, start)
+                    moved = held_gains(amplitude, held, start, stop)[1]
+                    displacement += velocity * (stop - start) + moved
+                    velocity = 0.0
+                    slides = False
+                    start = stop
+                    x = amplitude * (1.0 - versine(stop))
+                    response = x - relative_acceleration(batch, j, x, g)[0]
+                    continue
             gained, moved = held_gains(amplitude, held, start, switch)
-            batch.displacement[j] += velocity * (switch - start) + moved
-            batch.velocity[j] = max(velocity + gained, 0.0)
+            displacement += velocity * (switch - start) + moved
+            velocity = max(velocity + gained, 0.0)
             # b follows Eq. 4
             if switch < end:
-                velocity = batch.velocity[j]
                 gains = eq4_gains(batch, j, switch, end, g)
                 until = end
                 slides = advances or velocity + gains.velocity > 0.0
                 if not slides:
+                    batch.velocity[j] = velocity
                     where = (batch, j, Quantity.VELOCITY_BY_EQ4, 0.0, switch, g)
                     until = root(where, end, switch, end, switch)
                     gains = eq4_gains(batch, j, switch, until, g)
-                batch.displacement[j] += velocity * (until - switch) + gains.displacement
-                batch.velocity[j] = max(velocity + gains.velocity, 0.0) if slides else 0.0
+                displacement += velocity * (until - switch) + gains.displacement
+                velocity = max(velocity + gains.velocity, 0.0) if slides else 0.0
                 held = response_at_end
-            batch.highest[j] = max(batch.highest[j], batch.velocity[j])
-            batch.least_velocity[j] = min(batch.least_velocity[j], batch.velocity[j])
+            batch.highest[j] = max(batch.highest[j], velocity)
+            least = min(least, velocity)
             break
-    batch.held[j] = held if batch.velocity[j] > 0.0 else amplitude
-    if governs:
-        batch.validity[j] = int(batch.validity[j]) | YIELD_GOVERNS
-    if batch.velocity[j] > 0.0 and held <= 0.0:  # by Eq. 12 the block does not come to rest
+    batch.velocity[j] = velocity
+    batch.displacement[j] = displacement
+    batch.least_velocity[j] = least
+    batch.held[j] = held if velocity > 0.0 else amplitude
+    if velocity > 0.0 and held <= 0.0:  # by Eq. 12 the block does not come to rest
         batch.validity[j] = KD_NOT_POSITIVE
         batch.cycles_left[j] = 0.0
+
+
+@inlined
+def yield_governs(batch: Batch, j: int, rise: int) -> bool:
+    """Return True if E ≤ Üy at all places of cell j, so that b = Üy throughout; not if literal."""
+    governs = rise != LITERAL
+    for i in range(int(batch.last_place[j]) + 1):
+        governs &= batch.responses[j, i] <= batch.yield_acceleration[j]
+    return governs
 
 
 @scalar
@@ -269,23 +287,26 @@ def repeat_alone(batch: Batch, j: int, cycles: int) -> None:
     left = eq.attenuated_velocity(at_t5, held, pause)
     if left > 0.0 and later > 0.0:
         batch.validity[j] = int(batch.validity[j]) | NOT_RECOUPLED
-    duration = pause if later > 0.0 else math.inf
-    gained = batch.displacement[j] + eq.attenuated_displacement(at_t5, held, duration)
+    to_t5 = batch.displacement[j]
+    gained = to_t5 + eq.attenuated_displacement(at_t5, held, pause)
     more = left - batch.entered[j]
     least = min(batch.least_velocity[j], left)
+    batch.highest[j] = max(batch.highest[j], batch.peak_velocity[j])
+    if later == 0.0 or more == 0.0 or (least > 0.0 and more > 0.0):
+        # all others are alike, and the last one runs out (`pulse.repeat`)
+        batch.total[j] += later * (gained + math.pi * more * (later - 1.0))
+        batch.total[j] += to_t5 + later * more * (HALF_PI - batch.yield_phase[j])
+        batch.total[j] += eq.attenuated_displacement(at_t5 + later * more, held, math.inf)
+        batch.highest[j] = max(batch.highest[j], batch.peak_velocity[j] + later * more)
+        batch.cycles_left[j] = 0.0
+        return
     alike = 0.0
-    if left == 0.0 and more == 0.0:
-        alike = later
-    elif later > 0.0 and (more == 0.0 or (least > 0.0 and more > 0.0)):
-        alike = later - 1.0  # the last one runs out
-    elif later > 0.0 and least > 0.0:
+    if least > 0.0:
         alike = min(later - 1.0, float(math.floor(least / -more)))
     batch.total[j] += (1.0 + alike) * gained + math.pi * more * alike * (alike + 1.0)
-    fastest = batch.peak_velocity[j] + max(alike * more, 0.0)
-    batch.highest[j] = max(batch.highest[j], fastest)
     left += alike * more
     later -= alike
-    if later > 0.0 and left == batch.seen_velocity[j]:
+    if left == batch.seen_velocity[j]:
         period = batch.seen_cycles_left[j] - later
         periods = float(math.floor((later - 1.0) / period))
         batch.total[j] += periods * (batch.total[j] - batch.seen_total[j])
@@ -315,6 +336,8 @@ def slip_alone(batch: Batch, used: int, options: Options) -> None:
         batch.next_look[j] = 1.0
         if j < used:
             find_places(batch, j, batch.yield_acceleration[j], batch.amplitude[j], options.g)
+            if yield_governs(batch, j, options.rise):
+                batch.validity[j] = YIELD_GOVERNS
     moving = used
     while moving > 0:
         for j in range(WIDTH):
@@ -363,7 +386,7 @@ def slide_alone(batch: Batch, j: int, options: Options) -> None:
         highest = max(0.0, half)
         find_places(batch, j, side * 0.0, side * amplitude, g)
         for i in range(1, int(batch.last_place[j])):
-            psi = rising_phase(abs(batch.places[j, i]), amplitude)
+            psi = batch.phases[j, i]
             gains = eq4_gains(batch, j, -HALF_PI, psi, g)
             gained = gains.velocity if side > 0.0 else 2.0 * gains.drift - gains.velocity
             highest = max(highest, max(gained, half - gained))

@@ -90,12 +90,14 @@ BATCH = np.dtype(
         [(name, np.float64, (ROOM,)) for name in BLOCK]
         + [(name, np.float64, (WIDTH,)) for name in QUANTITIES]
         # the number of the cell in the results, the kind of its motion (`kinds`), the number of
-        # cells; the places of each cell
+        # cells; the places of each cell: Üg, ψ and E
         + [
             ("cell", np.int64, (ROOM,)),
             ("kind", np.int64, (WIDTH,)),
             ("used", np.int64),
             ("places", np.float64, (WIDTH, MOST_PLACES)),
+            ("phases", np.float64, (WIDTH, MOST_PLACES)),
+            ("responses", np.float64, (WIDTH, MOST_PLACES)),
         ],
     )
 )
