@@ -103,15 +103,29 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
 
 
 def sine_solver(motion: Sine, options: block.Options) -> Solver:
-    """Return the solver of the paper's block under a plain sine: batches, then the walk."""
+    """Return the solver of the paper's block under a plain sine.
+
+    Batches solve several cells at once.  Cells that they leave are solved one by one, and what is
+    left of them by the walk.
+    """
+
+    def solve_in_batches(cells: np.ndarray, results: np.ndarray) -> None:
+        solve_sine(cells, options, False, results)
+
+    def solve_alone(cells: np.ndarray, results: np.ndarray) -> None:
+        solve_sine(cells, options, True, results)
+
+    def walk(cells: np.ndarray, results: np.ndarray) -> None:
+        solve_walk(cells, options, cutting.path_of_waveform(motion), *workspace_of(), results)
 
     def solve(cells: np.ndarray, results: np.ndarray) -> None:
-        if solve_sine(cells, options, results):
+        solve_in_batches(cells, results)
+        for solve_others in (solve_alone, walk):
             unsolved = np.flatnonzero(results[ROWS["validity"]] == block.UNSOLVED)
-            path = cutting.path_of_waveform(motion)
-            walked = np.empty((len(block.Motion._fields), unsolved.size))
-            solve_walk(cells[unsolved], options, path, *workspace_of(), walked)
-            results[:, unsolved] = walked
+            if unsolved.size:
+                others = np.empty((len(block.Motion._fields), unsolved.size))
+                solve_others(cells[unsolved], others)
+                results[:, unsolved] = others
 
     return Solver(solve, ROWS)
 
@@ -150,9 +164,10 @@ def newmark_solver(problem: Problem, options: block.Options, polarity: float) ->
         newmark.solve_newmark(cells, options.g, options.wants_peak, path, blocks, results)
 
     def solve_in_batches(cells: np.ndarray, results: np.ndarray) -> None:
-        if not solve_sine(cells, options, results):
-            return
+        solve_sine(cells, options, False, results)
         unsolved = np.flatnonzero(results[ROWS["validity"]] == block.UNSOLVED)
+        if not unsolved.size:
+            return
         others = np.full(unsolved.size, math.nan, newmark.NEWMARK_CELL)
         for name in newmark.DOWNSLOPE_FIELDS:
             others[name] = cells[name][unsolved]
