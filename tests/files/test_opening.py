@@ -13,7 +13,7 @@ import slipsweep
 from slipsweep.errors import InputError
 from slipsweep.files import spec
 from slipsweep.files.opening import read_result
-from slipsweep.grid.tally import tally_of
+from slipsweep.studies.result_counts import tally_of
 from tests.support.commands import command
 from tests.support.stored_runs import job_of, run
 

@@ -102,7 +102,7 @@ def test_a_resumed_run_solves_the_missing_chunks_and_writes_the_same_result(
     folder: Path, interrupted: Path, solves: list[int]
 ) -> None:
     report = run(job_of(folder, "sweep"), interrupted, resume=True)
-    assert not report.found
+    assert not report.was_complete
     assert len(solves) == 21
     run(job_of(folder, "sweep"), folder / "b.nc")
     assert_same_result(interrupted, folder / "b.nc")
@@ -127,7 +127,7 @@ def complete(request: pytest.FixtureRequest, folder: Path) -> Path:
 def test_a_complete_run_is_found_and_not_solved_again(
     folder: Path, complete: Path, solves: list[int]
 ) -> None:
-    assert run(job_of(folder, "sweep"), complete, resume=True).found
+    assert run(job_of(folder, "sweep"), complete, resume=True).was_complete
     assert solves == []
 
 
@@ -192,7 +192,7 @@ def test_a_run_goes_on_with_more_memory_in_chunks_of_the_same_size(
 ) -> None:
     path = interrupted_at_2400_cells
     report = run(job_of(folder, "sweep"), path, resume=True, memory=7200 * CELL_BYTES)
-    assert not report.found
+    assert not report.was_complete
     assert solves == [2400]
     run(job_of(folder, "sweep"), folder / "b.nc", memory=7200 * CELL_BYTES)
     assert_same_result(path, folder / "b.nc")

@@ -15,7 +15,7 @@ from slipsweep.errors import InputError
 from slipsweep.files import running, spec
 from slipsweep.files.jobs import sweep_job
 from slipsweep.files.opening import read_result
-from slipsweep.grid.tally import tally_of
+from slipsweep.studies.result_counts import tally_of
 from tests.support.stored_runs import STUDIES, WAVE, assert_same_result, job_of, run, values_of
 
 
@@ -167,7 +167,7 @@ def test_a_store_at_an_address_has_the_same_result(folder: Path) -> None:
 def test_a_store_at_an_address_is_found_complete(folder: Path) -> None:
     address = "memory://bucket/complete.zarr"
     run(job_of(folder, "sweep"), address)
-    assert run(job_of(folder, "sweep"), address, resume=True).found
+    assert run(job_of(folder, "sweep"), address, resume=True).was_complete
 
 
 def test_an_address_of_an_unknown_protocol_is_refused(folder: Path) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from slipsweep.explore.excerpt import Excerpt, evenly_spaced, thinned_lengths
 from slipsweep.grid import engine, plans, solvers
-from slipsweep.grid.inputs import Inputs, Problem
+from slipsweep.grid.inputs import Problem
 from slipsweep.kernels.history import History
 from slipsweep.model.options import MODELS, Cycle, changing_strength
 from slipsweep.model.variables import VALUELESS
@@ -123,7 +123,7 @@ def _cells(
         dims = [renamed[str(dim)] for dim in kept.dims]
         kept_inputs[name] = xr.DataArray(kept.values, dims=dims)
     plan = plans.plan_sweep(
-        Inputs(**kept_inputs, frequency=1.0 / (2.0 * math.pi)),  # ω = 1 rad/s
+        {**kept_inputs, "frequency": 1.0 / (2.0 * math.pi)},  # ω = 1 rad/s
         excitation=problem.excitation,
         model=problem.model,
         variables=("validity",),

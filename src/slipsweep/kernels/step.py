@@ -31,13 +31,13 @@ from slipsweep.kernels.block import (
     Options,
 )
 from slipsweep.model import equations as eq
+from slipsweep.model.options import StepRule
 from slipsweep.motion.paths import TERMS, Base, Path
 
-#: Rules by which steps are taken: Euler's, Heun's and, where friction does not depend on the motion,
-#: Simpson's, else that of Runge and Kutta.  Their errors are of the orders 1, 2 and 4.
-RECTANGLE = 0
-TRAPEZOID = 1
-SIMPSON = 2
+#: Rules by which steps are taken (`model.options.StepRule`).
+RECTANGLE = int(StepRule.RECTANGLE)
+TRAPEZOID = int(StepRule.TRAPEZOID)
+SIMPSON = int(StepRule.SIMPSON)
 
 #: Stages of the rules: each evaluates the rate at a node, a part of the step, from the second on
 #: reached with the rate of the stage before it; their weights in the gain of V, over h, and of W,
