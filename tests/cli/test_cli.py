@@ -67,7 +67,7 @@ def names(folder: Path) -> set[str]:
 # ------------------------------------------------------------------------------------- run
 
 
-def test_run_paper(tmp_path: Path) -> None:
+def test_a_run_of_the_papers_cases_gives_table_1(tmp_path: Path) -> None:
     done = command(tmp_path, "run", SWEEPS / "paper.toml")
     assert done.returncode == 0
     assert done.stderr == ""  # no progress bar but on a terminal
@@ -93,7 +93,7 @@ def test_run_repeats_a_result(small: Path) -> None:
         assert other.history.endswith("slipsweep run a.nc -o b.nc --quiet")
 
 
-def test_the_name_of_the_output(small: Path) -> None:
+def test_an_output_is_named_by_option_by_sweep_file_or_after_it(small: Path) -> None:
     (small / "other.toml").write_text(f'{SMALL}[output]\npath = "mine.nc"')
     for arguments, name in (
         (("small.toml",), "small.nc"),
@@ -381,7 +381,7 @@ def test_a_report_has_a_title_page_and_a_chart_a_page(small: Path) -> None:
         (["run", "small.toml"], {"matplotlib"}),
     ],
 )
-def test_what_a_command_does_not_need_is_not_loaded(
+def test_a_command_loads_only_packages_that_it_needs(
     small: Path, arguments: list[str], heavy: set[str]
 ) -> None:
     code = f"import sys; from slipsweep.cli import main; main({arguments}); print(*sys.modules)"

@@ -185,7 +185,7 @@ def test_run_and_info_say_what_motions_lack(
     )
 
 
-def test_what_no_design_must_rest_on_goes_with_the_result(
+def test_unsound_cells_are_named_wherever_a_result_goes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -254,7 +254,7 @@ def test_limit_says_what_it_took(tmp_path: Path) -> None:
     assert bare == told("limit", sweep, "-d", "50mm", "--maximum-amplitude", "2g")
 
 
-def test_version() -> None:
+def test_the_version_is_printed() -> None:
     assert told("--version") == f"slipsweep {__version__}\n"
 
 

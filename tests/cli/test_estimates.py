@@ -69,7 +69,7 @@ def test_every_result_says_what_is_estimated(inputs: dict[str, Any], words: str)
         ),
     ],
 )
-def test_what_is_drawn_is_told_apart(
+def test_drawn_parameters_are_named_as_drawn(
     names: tuple[str, ...], drawn: dict[str, str], words: str
 ) -> None:
     assert friction_inputs("mendez", names, drawn) == words

@@ -114,7 +114,9 @@ def test_hazard_takes_equations_in_place_of_the_suite(folder: Path) -> None:
         ),
     ],
 )
-def test_what_is_refused(folder: Path, arguments: tuple[str, ...], message: str) -> None:
+def test_options_that_do_not_fit_are_refused(
+    folder: Path, arguments: tuple[str, ...], message: str
+) -> None:
     done = command(folder, *arguments)
     assert (done.returncode, done.stdout) == (2, "")
     assert message in done.stderr

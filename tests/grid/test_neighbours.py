@@ -36,7 +36,7 @@ def test_a_dataframe_has_a_row_for_each_cell(result: xr.Dataset) -> None:
 
 
 @pytest.mark.parametrize("chunks", [None, 2])
-def test_functions_of_arrays(result: xr.Dataset, chunks: int | None) -> None:
+def test_numpy_functions_apply_to_results(result: xr.Dataset, chunks: int | None) -> None:
     values = (
         result.permanent_displacement
         if chunks is None

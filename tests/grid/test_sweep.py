@@ -137,7 +137,7 @@ def test_parameters_are_copied() -> None:
     np.testing.assert_array_equal(result.theta, [0.0, 5.0])
 
 
-def test_displacement_amplitude() -> None:
+def test_a_displacement_amplitude_gives_the_amplitude_of_the_acceleration() -> None:
     frequency = np.array([0.5, 1.0, 2.0])
     displacement = np.array([0.01, 0.05])
     names = ["permanent_displacement", "acceleration_ratio", "amplitude"]
@@ -224,7 +224,7 @@ def test_variables_are_returned_as_asked() -> None:
     )
 
 
-def test_what_is_given_is_a_coordinate_and_no_result() -> None:
+def test_a_given_parameter_is_a_coordinate_and_no_result() -> None:
     result = slipsweep.sweep(**AXES, delta_mu=0.1, variables=["delta_mu", "decay_rate"])
     assert tuple(result.data_vars) == ("decay_rate",)
     assert result.delta_mu.item() == 0.1

@@ -81,12 +81,12 @@ FUNCTIONS: dict[str, tuple[Callable[[Any], Any], Array, float]] = {
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_within_its_last_digits(name: str) -> None:
+def test_errors_are_a_few_units_in_the_last_place(name: str) -> None:
     function, places, allowed = FUNCTIONS[name]
     assert worst(over(getattr(elementary, name), places), function, places) <= allowed
 
 
-def test_rising_phase() -> None:
+def test_the_rising_phase_is_accurate_near_the_peak() -> None:
     """As near to the peak as the two differ: there an angle of arccos has no digits."""
     amplitude = np.exp(np.random.default_rng(1).uniform(-20.0, 20.0, 3000))
     below = np.concatenate([spread(0.0, 1.0, 1e-16)[:2999], [0.0]])
@@ -96,7 +96,7 @@ def test_rising_phase() -> None:
     assert worst(phases, lambda x, a: -mpmath.acos(x / a), x, amplitude) <= 3.5
 
 
-def test_beyond_their_ranges() -> None:
+def test_arguments_beyond_the_range_give_the_values_at_its_ends() -> None:
     held = over(elementary.exp, np.array([-1e300, -710.0, -708.0, 709.0, 710.0, 1e300]))
     assert held.tolist() == [held[2]] * 3 + [held[3]] * 3
     ends = over(elementary.log, np.array([-math.inf, -1.0, 0.0, 1.0, math.inf]))

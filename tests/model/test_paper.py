@@ -127,7 +127,7 @@ def test_figures_with_the_printed_decay_rate(
         (CONTINUOUS, 3.5, {"decay_rate": 2.30, "delta_mu": 0.11}, "161.8", "316.5", Validity(0)),
     ],
 )
-def test_what_the_inputs_are_worth(
+def test_displacements_by_measured_printed_and_estimated_inputs(
     experiment: dict[str, Any],
     frequency: float,
     inputs: dict[str, Any],

@@ -122,7 +122,7 @@ def test_motions_without_a_measure() -> None:
     assert math.isnan(measures(10.0 * np.arange(400), noise(3).acceleration)["mean_period"])
 
 
-def test_as_eqsig_has_them() -> None:
+def test_measures_are_those_of_eqsig() -> None:
     """Motions of pySLAMMER; eqsig's trapezoids have the straight lines 16 times as finely."""
     eqsig = pytest.importorskip("eqsig")
     pyslammer = pytest.importorskip("pyslammer")

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
-from slipsweep import InputError, Pair, Record, Suite, read_record, read_suite
-from slipsweep.motion.cutting import path_of_record
+from slipsweep import InputError, Pair, Record, Suite, read_record, read_suite, sweep
 from slipsweep.motion.intensity import arias_intensity
 from tests.support.intensity import measures_by_sums
 
@@ -89,19 +89,42 @@ def test_motions_that_are_the_same_are_told(folder: Path) -> None:
     assert "duplicate_motions" not in suite[["a", "b"]].attrs
 
 
-def test_a_suite_is_compared_by_what_is_in_it(folder: Path) -> None:
-    one = read_suite(folder)
-    sent = pickle.loads(pickle.dumps(one))
-    assert sent == one == read_suite(folder)
-    assert hash(sent) == hash(one)
-    # a worker gets it with every chunk, and makes the tables of its records once
-    assert path_of_record(sent.components[0], 1.0) is path_of_record(one.components[0], 1.0)
-    assert one != one[:2]
-    assert one[:2] == one[["a", "b"]] == one[[0, 1]]
+def test_suites_of_the_same_motions_are_equal(folder: Path) -> None:
+    suite = read_suite(folder)
+    sent = pickle.loads(pickle.dumps(suite))
+    assert sent == suite == read_suite(folder)
+    assert hash(sent) == hash(suite)
+
+
+def test_suites_of_other_motions_differ(folder: Path) -> None:
+    suite = read_suite(folder)
+    assert suite != suite[:2]
     changed = read_record(folder / "a.csv").corrected("mean")
-    assert one != Suite((changed, *one.motions[1:]), one.labels, one.name)
-    assert repr(one[:2]) == f"Suite({str(folder)!r}: 2 motions: a, b)"
+    assert suite != Suite((changed, *suite.motions[1:]), suite.labels, suite.name)
+
+
+def test_a_part_of_a_suite_is_taken_by_labels_numbers_or_a_slice(folder: Path) -> None:
+    suite = read_suite(folder)
+    assert suite[:2] == suite[["a", "b"]] == suite[[0, 1]]
+    assert suite[:2].labels == ("a", "b")
+
+
+def test_a_suite_prints_its_name_and_labels(folder: Path) -> None:
+    assert repr(read_suite(folder)[:2]) == f"Suite({str(folder)!r}: 2 motions: a, b)"
+
+
+def test_a_long_suite_prints_its_first_and_last_labels() -> None:
     assert "8 motions: 0, 1, 2, ..., 6, 7" in repr(Suite((noise(1),) * 8, tuple("01234567")))
+
+
+def test_a_suite_that_was_sent_to_a_worker_gives_the_same_displacements(folder: Path) -> None:
+    suite = read_suite(folder)
+    results = [
+        sweep(5.0, 0.1, scale=3.0, excitation=motions)
+        for motions in (suite, pickle.loads(pickle.dumps(suite)))
+    ]
+    xr.testing.assert_identical(*results)
+    assert (results[0].permanent_displacement > 0.0).any()
 
 
 def test_measures_along_the_motions(folder: Path) -> None:
@@ -266,18 +289,26 @@ def test_vertical_components_are_left_out_and_named(folder: Path) -> None:
     ]
 
 
-def test_what_a_suite_of_vertical_components_says(folder: Path) -> None:
+def test_a_suite_of_vertical_components_only_is_refused(folder: Path) -> None:
     up = write(folder / "a_UP.csv")
-    with pytest.raises(
-        InputError, match=r"vertical components only: a_UP\.csv \(UP\); vertical = "
-    ):
+    with pytest.raises(InputError, match=r"vertical components only: a_UP\.csv \(UP\); vertical ="):
         read_suite([up])
+
+
+def test_a_vertical_component_in_a_pair_is_refused(folder: Path) -> None:
+    up = write(folder / "a_UP.csv")
     with pytest.raises(InputError, match=r"vertical components in pairs: a_UP\.csv \(UP\)"):
         read_suite([(folder / "a.csv", up)])
+
+
+def test_another_choice_of_vertical_components_is_refused(folder: Path) -> None:
     with pytest.raises(InputError, match="vertical = 'no': must be one of 'leave_out', 'accept'"):
         read_suite(folder, vertical="no")  # type: ignore[arg-type]
-    record = read_record(up)
-    assert read_suite([record]).motions == (record,)  # a Record was chosen by its reader
+
+
+def test_a_vertical_record_that_was_read_by_itself_is_accepted(folder: Path) -> None:
+    record = read_record(write(folder / "a_UP.csv"))
+    assert read_suite([record]).motions == (record,)
 
 
 def test_a_vertical_channel_is_left_out(tmp_path: Path) -> None:
