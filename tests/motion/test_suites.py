@@ -222,71 +222,7 @@ def test_the_shorter_component_is_continued_with_zeros() -> None:
         Pair(first, noise(2, 50, 0.02))
 
 
-def test_pairs_by_the_endings_of_their_names(tmp_path: Path) -> None:
-    for name in ("one_NS", "one_EW", "two_NS", "two_EW"):
-        write(
-            tmp_path / f"{name}.csv",
-            np.random.default_rng(len(name)).normal(size=5) + ("two" in name),
-        )
-    suite = read_suite(tmp_path, pairs=("_NS", "_EW"))
-    assert suite.labels == ("one", "two")
-    assert suite.has_pairs
-    assert suite["two"] == Pair(
-        read_record(tmp_path / "two_NS.csv"), read_record(tmp_path / "two_EW.csv")
-    )
-    listed = read_suite(
-        [[tmp_path / f"{name}_NS.csv", tmp_path / f"{name}_EW.csv"] for name in ("one", "two")]
-    )
-    assert listed.motions == suite.motions
-    assert suite.measures["motion_file"].tolist() == [
-        "one_NS.csv one_EW.csv",
-        "two_NS.csv two_EW.csv",
-    ]
-    write(tmp_path / "one_UD.csv")
-    assert read_suite(tmp_path, pairs=("_NS", "_EW")).motions == suite.motions
-    write(tmp_path / "three_NS.csv")
-    write(tmp_path / "single.csv")
-    with pytest.raises(
-        InputError, match=r"without the other component: single\.csv, three_NS\.csv"
-    ):
-        read_suite(tmp_path, pairs=("_NS", "_EW"))
-    for pairs in ("_NS", ("_NS",), ("_NS", ""), ("_NS", "_NS"), (1, 2)):
-        with pytest.raises(InputError, match=r"^pairs = "):
-            read_suite(tmp_path, pairs=pairs)  # type: ignore[arg-type]
-
-
 # ------------------------------------------------------------------------------ vertical components
-
-
-def test_vertical_components_are_left_out_and_named(folder: Path) -> None:
-    """By their names, which need not be read, and by their headers; an explicit word takes them."""
-    expected = read_suite(folder)
-    header = "PEER\nA place, 1/1/2000, A station, {}\nACCELERATION IN UNITS OF G\n"
-    at2 = f"{header}NPTS= 3, DT= .01\n0 .1 0\n"
-    (folder / "e.AT2").write_text(at2.format("VERT"))
-    (folder / "RSN1_A-UP.AT2").write_text(at2.format("UP"))
-    (folder / "z.UD").write_text("damaged\n")
-    for paths in (folder, f"{folder}/*", sorted(folder.iterdir())):
-        suite = read_suite(paths)
-        assert suite.motions == expected.motions
-        assert suite.left_out == ("RSN1_A-UP.AT2 (UP)", "e.AT2 (VERT)", "z.UD (UD)")
-        assert "; left out: RSN1_A-UP.AT2 (UP), e.AT2 (VERT), z.UD (UD))" in repr(suite)
-        assert suite.summary().endswith(
-            "left out, vertical components: RSN1_A-UP.AT2 (UP), e.AT2 (VERT), z.UD (UD); "
-            "vertical = 'accept' takes them"
-        )
-        assert suite.attrs["left_out_vertical"] == ", ".join(suite.left_out)
-    with pytest.raises(InputError, match=r"1 of 6 files cannot be read: z\.UD"):
-        read_suite(folder, vertical="accept")
-    (folder / "z.UD").unlink()
-    accepted = read_suite(folder, vertical="accept")
-    assert accepted.labels == ("RSN1_A-UP", "a", "b", "c", "e")
-    assert accepted.left_out == ()
-    assert accepted["e"].attrs["record_caution"] == "vertical component (VERT)"
-    assert accepted.cautions() == [
-        f"caution: {folder / 'RSN1_A-UP.AT2'}: vertical component (UP)",
-        f"caution: {folder / 'e.AT2'}: vertical component (VERT)",
-    ]
 
 
 def test_a_suite_of_vertical_components_only_is_refused(folder: Path) -> None:
@@ -319,3 +255,98 @@ def test_a_vertical_channel_is_left_out(tmp_path: Path) -> None:
     suite = read_suite(tmp_path, channel=2, implausible="accept")
     assert suite.labels == ("one",)
     assert suite.left_out == ("two.csv (UD)",)
+
+
+@pytest.fixture
+def pairs(tmp_path: Path) -> Path:
+    """Two motions of two components, by the endings of their names."""
+    for name in ("one_NS", "one_EW", "two_NS", "two_EW"):
+        values = np.random.default_rng(len(name)).normal(size=5) + ("two" in name)
+        write(tmp_path / f"{name}.csv", values)
+    return tmp_path
+
+
+def test_pairs_are_told_by_the_endings_of_their_names(pairs: Path) -> None:
+    suite = read_suite(pairs, pairs=("_NS", "_EW"))
+    assert suite.has_pairs
+    assert suite.labels == ("one", "two")
+    expected = Pair(read_record(pairs / "two_NS.csv"), read_record(pairs / "two_EW.csv"))
+    assert suite["two"] == expected
+    files = ["one_NS.csv one_EW.csv", "two_NS.csv two_EW.csv"]
+    assert suite.measures["motion_file"].tolist() == files
+
+
+def test_pairs_are_listed(pairs: Path) -> None:
+    paths = [[pairs / f"{name}_NS.csv", pairs / f"{name}_EW.csv"] for name in ("one", "two")]
+    assert read_suite(paths).motions == read_suite(pairs, pairs=("_NS", "_EW")).motions
+
+
+def test_vertical_components_beside_pairs_are_left_out(pairs: Path) -> None:
+    expected = read_suite(pairs, pairs=("_NS", "_EW")).motions
+    write(pairs / "one_UD.csv")
+    assert read_suite(pairs, pairs=("_NS", "_EW")).motions == expected
+
+
+def test_components_without_the_other_are_refused(pairs: Path) -> None:
+    write(pairs / "three_NS.csv")
+    write(pairs / "single.csv")
+    message = r"without the other component: single\.csv, three_NS\.csv"
+    with pytest.raises(InputError, match=message):
+        read_suite(pairs, pairs=("_NS", "_EW"))
+
+
+@pytest.mark.parametrize("endings", ["_NS", ("_NS",), ("_NS", ""), ("_NS", "_NS"), (1, 2)])
+def test_endings_that_are_no_two_texts_are_refused(pairs: Path, endings: Any) -> None:
+    with pytest.raises(InputError, match=r"^pairs = "):
+        read_suite(pairs, pairs=endings)
+
+
+AT2 = """PEER
+A place, 1/1/2000, A station, {}
+ACCELERATION IN UNITS OF G
+NPTS= 3, DT= .01
+0 .1 0
+"""
+
+
+@pytest.fixture
+def with_verticals(folder: Path) -> Path:
+    """The folder with two vertical components by their headers, of which one also by its name."""
+    (folder / "e.AT2").write_text(AT2.format("VERT"))
+    (folder / "RSN1_A-UP.AT2").write_text(AT2.format("UP"))
+    return folder
+
+
+@pytest.mark.parametrize("kind", ["folder", "pattern", "list"])
+def test_vertical_components_are_left_out_and_named(with_verticals: Path, kind: str) -> None:
+    """By their headers or by their names, which need not be read."""
+    (with_verticals / "z.UD").write_text("damaged\n")
+    paths: dict[str, Any] = {
+        "folder": with_verticals,
+        "pattern": f"{with_verticals}/*",
+        "list": sorted(with_verticals.iterdir()),
+    }
+    suite = read_suite(paths[kind])
+    assert suite.labels == ("a", "b", "c")
+    names = "RSN1_A-UP.AT2 (UP), e.AT2 (VERT), z.UD (UD)"
+    assert ", ".join(suite.left_out) == suite.attrs["left_out_vertical"] == names
+    assert f"; left out: {names})" in repr(suite)
+    left_out = f"left out, vertical components: {names}; vertical = 'accept' takes them"
+    assert suite.summary().endswith(left_out)
+
+
+def test_vertical_components_are_accepted_with_a_caution(with_verticals: Path) -> None:
+    suite = read_suite(with_verticals, vertical="accept")
+    assert suite.labels == ("RSN1_A-UP", "a", "b", "c", "e")
+    assert suite.left_out == ()
+    assert suite["e"].attrs["record_caution"] == "vertical component (VERT)"
+    assert suite.cautions() == [
+        f"caution: {with_verticals / 'RSN1_A-UP.AT2'}: vertical component (UP)",
+        f"caution: {with_verticals / 'e.AT2'}: vertical component (VERT)",
+    ]
+
+
+def test_an_accepted_vertical_component_has_to_be_read(folder: Path) -> None:
+    (folder / "z.UD").write_text("damaged\n")
+    with pytest.raises(InputError, match=r"1 of 4 files cannot be read: z\.UD"):
+        read_suite(folder, vertical="accept")
