@@ -14,7 +14,7 @@ from typing import NamedTuple
 from slipsweep.jit.decorators import inlined, scalar, single
 from slipsweep.jit.elementary import versine
 from slipsweep.kernels.base import base_acceleration, offset_at
-from slipsweep.kernels.block import Cell, Interface, Options, decay_rate_of
+from slipsweep.kernels.block import LITERAL, Cell, Interface, Options, decay_rate_of
 from slipsweep.kernels.events import root_of
 from slipsweep.kernels.slide import Slide
 from slipsweep.model import equations as eq
@@ -112,6 +112,18 @@ def opposite(a: float, b: float) -> bool:
     return a < 0.0 < b or b < 0.0 < a
 
 
+@inlined
+def follows_eq4(block: Block, held: float, response: float, slope: float, follows: bool) -> bool:
+    """Return True if b is E on a rise of Üg, and not held: option `rise`.
+
+    Literal: b = E.  Monotone, b = max(b, E): b follows E once that has risen above it, and for as
+    long as E rises.  `held` is b so far, `slope` dE/dx, and `follows` is said of b just before.
+    """
+    if block.rise == LITERAL:
+        return True
+    return slope > 0.0 and (follows or response > held)
+
+
 # ----------------------------------------------------------------------------------------- roots
 
 
@@ -157,14 +169,14 @@ def relative_acceleration_root(block: Block, start: float, end: float) -> float:
 
 
 @scalar
-def stays_below_yield(block: Block, start: float, end: float) -> bool:
-    """Return whether E ≤ Üy from x = `start` ≥ Üy to `end`."""
+def stays_at_yield(block: Block, start: float, end: float) -> bool:
+    """Return True if b, at Üy before, stays there while Üg rises from `start` ≥ Üy to `end`."""
     highest = max(response(block, start), response(block, end))
     bend = min(inflection(block), end)
     if bend > start and slopes(block, start)[1] > 0.0 > slopes(block, bend)[1]:
         turn = eq4_root(block, Quantity.SLOPE, 0.0, start, bend, bend)
         highest = max(highest, response(block, turn))
-    return highest <= block.yield_acceleration
+    return not follows_eq4(block, block.yield_acceleration, highest, math.inf, False)
 
 
 # ------------------------------------------------------------------------- gains along a piece
