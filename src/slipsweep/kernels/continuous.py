@@ -89,7 +89,7 @@ def follow_eq4(
     # apart, because over a symmetric cycle they cancel to the last digit
     above = 0.0
     below = 0.0
-    drift = 0.0
+    lag_x = 0.0
     velocity = 0.0
     last = until.piece + 1 if until.piece < base.pieces.size else until.piece
     for p in range(start.piece, last):
@@ -116,8 +116,8 @@ def follow_eq4(
             above += lag.first
         else:
             below += lag.first
-        drift += lag.first_x
-        velocity = block.g * (above - below) + block.tan_theta * drift
+        lag_x += lag.first_x
+        velocity = block.g * (above - below) + block.tan_theta * lag_x
         slide.velocity = velocity
         slide.peak = max(slide.peak, velocity)
 

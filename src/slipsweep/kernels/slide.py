@@ -4,7 +4,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from slipsweep.jit.decorators import inlined
+from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.motion.pieces import NODES
 
 #: More stages than any rise has: five places where E, dE/dx or D turn, and a stop and an onset
@@ -82,7 +82,7 @@ def begin_to_slide(slide: Slide, held: float) -> None:
     slide.slips += 1.0
 
 
-@inlined
+@scalar
 def gain(slide: Slide, velocity: float, displacement: float) -> None:
     """Set V at the end of a part of the motion, and add the W gained in it."""
     slide.velocity = velocity

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from slipsweep.jit.decorators import inlined, scalar, single
+from slipsweep.jit.decorators import scalar, single
 from slipsweep.kernels.base import base_acceleration, held_gains, offset_at, phase_at
 from slipsweep.kernels.block import (
     INTEGRATE,
@@ -30,7 +30,7 @@ from slipsweep.kernels.eq4 import (
     response,
     slopes,
 )
-from slipsweep.kernels.events import root_of, straight_stop
+from slipsweep.kernels.roots import root_of, straight_stop
 from slipsweep.kernels.sampling import GROUND_ACCELERATION, fill_sample, has_sample
 from slipsweep.kernels.slide import (
     ATTENUATES,
@@ -67,10 +67,10 @@ def rising_acceleration(block: Block, held: float, x: float) -> float:
     At the onset, with Üy for the b before, it is the paper's c(x).
     """
     by_eq4 = response(block, x)
-    return by_eq4 if follows_eq4(block, held, by_eq4, math.inf, False) else held
+    return by_eq4 if follows_eq4(block, held, by_eq4, math.inf) else held
 
 
-@inlined
+@scalar
 def inside(x: float, end: float) -> float:
     """Return a place just beyond x on the way to `end`; at x, perhaps a root, signs are rounding."""
     way = end - x
@@ -136,7 +136,8 @@ def next_stage(block: Block, x: float, top: float, slide: Slide) -> Stage:
         inner = inside(x, end)
     rate, slope, _ = slopes(block, inner)
     held = slide.held
-    if follows_eq4(block, held, inner - rate, slope, slide.follows):
+    # a block that has followed E so far has no b that E would have to exceed
+    if follows_eq4(block, -math.inf if slide.follows else held, inner - rate, slope):
         if not bends:
             # E is convex, D concave: it may be positive between two places where it is not
             end = next_break(block, x, top)

@@ -95,7 +95,7 @@ def begin(walk: Walk, path: Path) -> None:
     walk.slips = 0.0
     walk.stick_slip_pulses = 0.0
     walk.continuous_pulses = 0.0
-    walk.interval = -1
+    walk.interval = 0
     walk.left = path.repeats
     walk.first = -1
     walk.seen_velocity = 0.0
@@ -253,7 +253,7 @@ def walk_pulses(
     plain = path.cycles[path.lead].first
     plain_end = path.cycles[path.lead + 1].first if path.repeats > 0 else plain
     continuous = False
-    walk.interval = first_pulse(block, path, 0)
+    walk.interval = first_pulse(block, path, walk.interval)
     while walk.interval < path.intervals.size and walk.validity & NO_VALUE == 0:
         if samples.size and slide.sampled == samples.shape[1]:
             break
@@ -317,7 +317,7 @@ def slide_through_cycles(
     Cycles of one shape, one after the other, are a series; for samples each is gone through.
     docs/numerics.md#continuous-sliding
     """
-    start = beginning(block, path, first_pulse(block, path, 0))
+    start = beginning(block, path, first_pulse(block, path, walk.interval))
     find_velocity_extremes(block, options.wants_peak, path, slide)
     shape = -1  # of the cycle whose gains are in `walk.gained` and the two that follow
     cycle_velocity = 0.0

@@ -112,7 +112,7 @@ def _sign_changes(derivative: Derivative, lowest: int, edges: Exact) -> list[Exa
 
     Bracketed, the highest order first: between two places where the next derivative does so this
     one is monotone, and passes 0 once at most.  Then by Newton's iteration, guarded as that of
-    `kernels.events`.
+    `kernels.roots`.
     """
     found: list[Exact] = []
     for order in range(_HIGHEST, lowest - 1, -1):
