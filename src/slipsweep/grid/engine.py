@@ -20,7 +20,7 @@ from slipsweep.grid import solvers, threads
 from slipsweep.grid.chunks import Chunk, grid_chunks, sizes_within, variables_within
 from slipsweep.grid.inputs import Problem
 from slipsweep.kernels.block import UNSOLVED, Cell
-from slipsweep.kernels.step import STRENGTH_FIELDS
+from slipsweep.kernels.step_cells import STRENGTH_FIELDS
 from slipsweep.model import variables as known
 from slipsweep.model.options import changing_strength, slides_both_ways
 from slipsweep.model.parameters import number_text

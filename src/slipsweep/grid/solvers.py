@@ -8,7 +8,7 @@ import numpy as np
 
 from slipsweep.grid.inputs import Problem
 from slipsweep.kernels import block as physics
-from slipsweep.kernels import history, newmark, newmark_record, step, strength
+from slipsweep.kernels import history, newmark, newmark_record, step, step_cells, strength
 from slipsweep.kernels.grid import CELL, find_parameters
 from slipsweep.kernels.newmark_history import fill_newmark_history
 from slipsweep.kernels.sine.solve import solve_sine
@@ -103,7 +103,7 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
         return Solver(
             lambda cells, results: stepper(cells, no_log, results),
             ROWS_WITH_EXTREMES,
-            step.STEP_CELL,
+            step_cells.STEP_CELL,
         )
     if isinstance(motion, Record):
         path = cutting.path_of_record(motion, polarity)
@@ -188,7 +188,7 @@ def fill_history(
 def stepper_of(
     problem: Problem, options: physics.Options, polarity: float
 ) -> Callable[[np.ndarray, np.ndarray, np.ndarray], Any]:
-    """What solves cells by steps: cells, of dtype `step.STEP_CELL`, a log and results.
+    """What solves cells by steps: cells, of dtype `step_cells.STEP_CELL`, a log and results.
 
     It returns the block of the last cell.
     """
@@ -199,11 +199,11 @@ def stepper_of(
     is_record = isinstance(problem.excitation, Record)
     on_piece = math.ceil(count / STEPS_PER_SAMPLE) if is_record else 0
     path = path_under(problem.excitation, polarity)
-    steps = step.steps_of(path, rule, count, on_piece)
+    steps = step_cells.steps_of(path, rule, count, on_piece)
     take_steps = stepping_kernel(problem.model)
 
     def solve(cells: np.ndarray, log: np.ndarray, results: np.ndarray) -> Any:
-        blocks = step.blocks_of(rule, count, on_piece)
+        blocks = step_cells.blocks_of(rule, count, on_piece)
         take_steps(cells, options, path, blocks, steps, log, results)
         return blocks[0]
 
@@ -215,7 +215,7 @@ def stepping_kernel(model: Model) -> Callable[..., Any]:
     changing = changing_strength(model)
     if changing == "weakening":
         return strength.solve_weakening
-    return strength.solve_rate if changing == "rate" else step.solve_steps
+    return strength.solve_rate if changing == "rate" else step_cells.solve_steps
 
 
 def is_plain_sine(motion: Any) -> bool:
