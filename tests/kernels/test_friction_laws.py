@@ -75,7 +75,9 @@ def motion_of(
     solve: Callable[..., None], rise: int, cycles: int, steps_per_cycle: int, **cell: float
 ) -> dict[str, float]:
     """Step a cell, by Simpson's rule; V and W are times ω and ω²."""
-    cells = np.full((1, len(step_cells.STEP_CELL.names or ())), np.nan).view(step_cells.STEP_CELL)[:, 0]
+    cells = np.full((1, len(step_cells.STEP_CELL.names or ())), np.nan).view(step_cells.STEP_CELL)[
+        :, 0
+    ]
     cells["tan_theta"] = tan(THETA)
     cells["seconds"] = 1.0 / OMEGA
     for name, value in cell.items():

@@ -17,14 +17,14 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from slipsweep.jit.decorators import inlined, registered, scalar
+from slipsweep.jit.decorators import inlined, registered, scalar, single
 from slipsweep.kernels import block as flags
 from slipsweep.kernels.block import EQ12, LITERAL, MONOTONE, NO_VALUE, Cell, Interface
 from slipsweep.model import equations as eq
 from slipsweep.motion.paths import Path, Piece
 
-#: Rules by which steps are taken: Euler's, Heun's and, where friction does not depend on the motion,
-#: Simpson's, else that of Runge and Kutta.  Their errors are of the orders 1, 2 and 4.
+#: Rules by which steps are taken: Euler's, Heun's and that of Runge and Kutta, which is Simpson's
+#: where friction does not depend on the motion.  Their errors are of the orders 1, 2 and 4.
 RECTANGLE = 0
 TRAPEZOID = 1
 SIMPSON = 2
@@ -32,15 +32,10 @@ SIMPSON = 2
 #: Stages of the rules: each evaluates the rate at a node, a part of the step, from the second on
 #: reached with the rate of the stage before it; their weights in the gain of V, over h, and of W,
 #: over h².
-RUNGE_KUTTA = 3
-STAGES = np.array([1, 1, 2, 3])  # after the first, which is known from the step before
-NODES = np.array([[0, 1, 0, 0], [0, 1, 0, 0], [0, 1 / 2, 1, 0], [0, 1 / 2, 1 / 2, 1]])
-VELOCITY_WEIGHTS = np.array(
-    [[1, 0, 0, 0], [1 / 2, 1 / 2, 0, 0], [1 / 6, 4 / 6, 1 / 6, 0], [1 / 6, 2 / 6, 2 / 6, 1 / 6]]
-)
-DISPLACEMENT_WEIGHTS = np.array(
-    [[1 / 2, 0, 0, 0], [1 / 3, 1 / 6, 0, 0], [1 / 6, 2 / 6, 0, 0], [1 / 6, 1 / 6, 1 / 6, 0]]
-)
+STAGES = np.array([1, 1, 3])  # after the first, which is known from the step before
+NODES = np.array([[0, 1, 0, 0], [0, 1, 0, 0], [0, 1 / 2, 1 / 2, 1]])
+VELOCITY_WEIGHTS = np.array([[1, 0, 0, 0], [1 / 2, 1 / 2, 0, 0], [1 / 6, 2 / 6, 2 / 6, 1 / 6]])
+DISPLACEMENT_WEIGHTS = np.array([[1 / 2, 0, 0, 0], [1 / 3, 1 / 6, 0, 0], [1 / 6, 1 / 6, 1 / 6, 0]])
 
 #: Phases of the motion, each with its block acceleration Ü.
 STUCK = 0  # Ü = Üg, V = 0
@@ -121,8 +116,8 @@ BLOCK = np.dtype(
             ("largest_displacement", "f8"),
             ("smallest_displacement", "f8"),
             ("zero", "f8"),  # time at τ = 0 of the piece
-            ("onset", "f8"),  # time at which the slide began, and the rest of the piece from there
-            ("growth", "f8"),
+            ("onset", "f8"),  # time at which the slide began
+            ("first_step", "f8"),  # the longest one after it
             ("slips", "f8"),
             ("stick_slip_pulses", "f8"),
             ("continuous_pulses", "f8"),
@@ -274,9 +269,42 @@ def advance(
 ) -> Step:
     """Find what a step h gains: V += (Üg − Ü) h.
 
+    Where friction does not depend on the motion, the rules are those of integrals over the step.
+    """
+    if law.knows_motion:
+        return advance_by_stages(law, block, start, middle, end, h, first_rate)
+    velocity = block.velocity
+    last_rate = rate(law, block, end, velocity, block.slip)
+    middle_rate = 0.5 * (first_rate + last_rate)
+    gained = first_rate
+    moved = 0.5 * first_rate
+    if block.rule == TRAPEZOID:
+        gained = middle_rate
+        moved = (2.0 * first_rate + last_rate) / 6.0
+    elif block.rule == SIMPSON:
+        middle_rate = rate(law, block, middle, velocity, block.slip)
+        gained = (first_rate + 4.0 * middle_rate + last_rate) / 6.0
+        moved = (first_rate + 2.0 * middle_rate) / 6.0
+    gained *= h
+    moved = (velocity + moved * h) * h
+    return Step(h, start, middle, end, first_rate, middle_rate, last_rate, gained, moved)
+
+
+@scalar
+def advance_by_stages(
+    law: Law,
+    block: Block,
+    start: float,
+    middle: float,
+    end: float,
+    h: float,
+    first_rate: float,
+) -> Step:
+    """Find what a step h gains where friction depends on the motion.
+
     Each stage of a rule goes from the start of the step to its node with the rate of the one before.
     """
-    rule = RUNGE_KUTTA if block.rule == SIMPSON and law.knows_motion else block.rule
+    rule = block.rule
     speed = block.velocity
     slope = first_rate
     middle_rate = first_rate
@@ -292,11 +320,10 @@ def advance(
         moved += DISPLACEMENT_WEIGHTS[rule, stage] * slope
     gained *= h
     moved = (block.velocity + moved * h) * h
-    if law.knows_motion:
-        slope = rate(law, block, end, block.velocity + gained, block.slip + abs(moved))
+    last_rate = rate(law, block, end, block.velocity + gained, block.slip + abs(moved))
     if rule < SIMPSON:
-        middle_rate = 0.5 * (first_rate + slope)
-    return Step(h, start, middle, end, first_rate, middle_rate, slope, gained, moved)
+        middle_rate = 0.5 * (first_rate + last_rate)
+    return Step(h, start, middle, end, first_rate, middle_rate, last_rate, gained, moved)
 
 
 @scalar
@@ -324,14 +351,13 @@ def first_rate_at(law: Law, block: Block, ground: float) -> float:
 
 @scalar
 def ground_in_step(
-    block: Block, piece: Piece, curves: np.ndarray, tau: float, h: float
-) -> tuple[float, float, float]:
-    """Üg at the start, the middle and the end of a step; in the middle a mean, if that will do."""
-    start = ground_at(block, piece, curves, tau)
+    block: Block, piece: Piece, curves: np.ndarray, start: float, tau: float, h: float
+) -> tuple[float, float]:
+    """Üg in the middle and at the end of a step; in the middle a mean, if that will do."""
     end = ground_at(block, piece, curves, tau + h)
     if block.rule == SIMPSON:
-        return start, ground_at(block, piece, curves, tau + 0.5 * h), end
-    return start, 0.5 * (start + end), end
+        return ground_at(block, piece, curves, tau + 0.5 * h), end
+    return 0.5 * (start + end), end
 
 
 @inlined
@@ -523,6 +549,7 @@ def end_phase(block: Block, ending: int) -> None:
 def rest(block: Block) -> None:
     """Come to rest."""
     block.phase = STUCK
+    block.held = 0.0
     block.velocity = 0.0
     block.least_velocity = min(block.least_velocity, 0.0)
     block.largest_displacement = max(block.largest_displacement, block.displacement)
@@ -533,7 +560,8 @@ def rest(block: Block) -> None:
 def begin_slide(block: Block, piece: Piece, tau: float) -> None:
     """Begin to slide at τ, from rest or with a velocity kept, in the phase that is set."""
     block.onset = block.zero + tau
-    block.growth = piece.finish - tau if block.phase != CONTINUOUS else math.inf
+    rest_of_piece = piece.finish - tau if block.phase != CONTINUOUS else math.inf
+    block.first_step = GROWTH_SHARE * rest_of_piece / block.steps
     if block.velocity == 0.0:
         block.slips += 1.0
 
@@ -701,11 +729,11 @@ def set_friction(block: Block, peak: float) -> Interface:
 @scalar
 def yield_governs(law: Law, block: Block, low: float, high: float) -> bool:
     """Return whether Eq. 4 stays at or below Üy while Üg rises from low to high, but for the literal rise."""
-    exceeds = block.rise != MONOTONE
-    for j in range(POINTS_OF_RISE + 1):
+    for j in range(POINTS_OF_RISE, -1, -1):
         ground = low + (high - low) * (j / POINTS_OF_RISE)
-        exceeds |= eq4_at(law, block, ground) > block.yield_acceleration
-    return not exceeds
+        if eq4_at(law, block, ground) > block.yield_acceleration:
+            return False
+    return block.rise == MONOTONE
 
 
 @scalar
@@ -757,6 +785,8 @@ def enter_piece(
             block.phase = FOLLOWS
     highest = block.amplitude * max(piece.first, piece.last)
     comes = piece.top > 0.0 and is_pulse and not block.in_pulse
+    if block.phase == CONTINUOUS and not block.recorded:
+        comes = False  # for good
     if not comes or highest < block.yield_acceleration:
         return math.inf
     if not block.rises or law.is_strength:
@@ -790,6 +820,22 @@ def begin_pulse(law: Law, block: Block, piece: Piece, tau: float, peak: float) -
 
 
 @scalar
+def slide_on(law: Law, block: Block, points: np.ndarray, h: float, first_rate: float) -> None:
+    """Continuous sliding, which does not end, in equal steps to the end of the piece."""
+    each = 2 if block.rule == SIMPSON else 1
+    start = block.amplitude * points[0]
+    for k in range(each, points.size, each):
+        end = block.amplitude * points[k]
+        middle = block.amplitude * points[k - 1] if each == 2 else 0.5 * (start + end)
+        step = advance(law, block, start, middle, end, h, first_rate)
+        if turns(step):
+            note_extreme(block, step)
+        take(block, step)
+        first_rate = step.last_rate
+        start = end
+
+
+@scalar
 def step_along(
     law: Law,
     block: Block,
@@ -810,12 +856,16 @@ def step_along(
     each = 2 if block.rule == SIMPSON else 1
     count = (points.size - 1) // each
     whole = (piece.finish - piece.begin) / count
+    share = TIME_SHARE / block.steps
     tau = piece.begin
     # the step on the piece that τ lies in, and its ends
     j = 0
     point = piece.begin
     next_point = piece.begin + whole if count > 1 else piece.finish
-    first_rate = math.nan  # where it is not known from the step before
+    # Üg at τ, and the rate, which is NaN where it is not known from the step before
+    ground = 0.0
+    first_rate = math.nan
+    goes_on = not law.knows_motion and log.size == 0
     while tau < piece.finish and block.validity & NO_VALUE == 0:
         if tau >= pulse:
             begin_pulse(law, block, piece, tau, peak)
@@ -841,22 +891,25 @@ def step_along(
             tau = until
             continue
         if math.isnan(first_rate):
-            first_rate = first_rate_at(law, block, ground_at(block, piece, curves, tau))
+            ground = ground_at(block, piece, curves, tau)
+            first_rate = first_rate_at(law, block, ground)
+        if goes_on and tau == point and until == piece.finish and block.phase == CONTINUOUS:
+            slide_on(law, block, points[each * j :], whole, first_rate)
+            return
         since = block.zero + tau - block.onset
-        longest = max(GROWTH_SHARE * block.growth, TIME_SHARE * since) / block.steps
+        longest = max(block.first_step, share * since)
         if law.knows_motion:
             longest = min(longest, law.longest_step(block, first_rate))
         if longest >= whole and tau == point and end == next_point:
             h = whole
             after = end
-            start = block.amplitude * points[each * j]
             last = block.amplitude * points[each * j + each]
-            middle = block.amplitude * points[2 * j + 1] if each == 2 else 0.5 * (start + last)
+            middle = block.amplitude * points[2 * j + 1] if each == 2 else 0.5 * (ground + last)
         else:
             h = min(max(longest, SHORTEST_STEP), end - tau)
             after = end if h >= end - tau else tau + h
-            start, middle, last = ground_in_step(block, piece, curves, tau, h)
-        step = advance(law, block, start, middle, last, h, first_rate)
+            middle, last = ground_in_step(block, piece, curves, ground, tau, h)
+        step = advance(law, block, ground, middle, last, h, first_rate)
         ending = GOES_ON
         if may_end(law, block, step):
             part, ending = end_of_phase(law, block, step)
@@ -867,13 +920,14 @@ def step_along(
             if ending != GOES_ON:
                 h *= part
                 after = tau + h
-                start, middle, last = ground_in_step(block, piece, curves, tau, h)
-                step = advance(law, block, start, middle, last, h, first_rate)
+                middle, last = ground_in_step(block, piece, curves, ground, tau, h)
+                step = advance(law, block, ground, middle, last, h, first_rate)
             if turns(step):
                 note_extreme(block, step)
         if log.size > 0:
             note(block, log, block.zero + tau, step)
         take(block, step)
+        ground = last
         first_rate = step.last_rate
         tau = after
         if ending != GOES_ON:
@@ -884,7 +938,7 @@ def step_along(
 # ------------------------------------------------------------------ piece after piece
 
 
-@scalar
+@single
 def walk(
     law: Law,
     block: Block,

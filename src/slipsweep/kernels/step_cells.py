@@ -14,6 +14,7 @@ from slipsweep.kernels.step import (
     BLOCK,
     CONTINUOUS,
     DOWN,
+    GROWTH_SHARE,
     LOG,
     SIMPSON,
     STUCK,
@@ -186,15 +187,15 @@ def run_out_by_strength(law: Law, block: Block, path: Path, steps: Steps, log: n
     offset = 2.0 * math.pi * max(path.repeats - 1, 0)
     p = path.base.pieces.size
     block.onset = steps.pieces[p].start + offset
-    block.growth = math.inf
+    block.first_step = math.inf
     while block.phase != STUCK and p < steps.pieces.size:
         slip = block.slip
         side = 1.0 if block.phase == DOWN else -1.0
         braking = resistance(law, block, side, block.velocity, slip)
         if braking <= 0.0 and slip >= block.weakens_until:
             break
-        # the time to the stop
-        block.growth = min(block.growth, abs(block.velocity / braking))
+        time_to_stop = abs(block.velocity / braking)
+        block.first_step = min(block.first_step, GROWTH_SHARE / block.steps * time_to_stop)
         walk(law, block, path, steps, p, p + 1, offset, log)
         if block.slip == slip:
             rest(block)  # where the strength that is left is just what holds it
@@ -274,49 +275,19 @@ def put_at_rest(law: Law, block: Block, cell: np.record, options: Options) -> No
     block.logged = 0
 
 
-@single
-def solve_cell(
-    law: Law,
-    block: Block,
-    cell: np.record,
-    options: Options,
-    path: Path,
-    steps: Steps,
-    log: np.ndarray,
-    result: np.ndarray,
-) -> None:
-    """Step a cell through the shaking and on to rest; `result` is (`block.RESULTS`,)."""
-    put_at_rest(law, block, cell, options)
-    block.validity = validity_before(block, path)
-    mode = block.mode
-    peak = block.amplitude * max(path.highest, -path.lowest)
-    slides_up = block.amplitude * -path.lowest > block.upslope_yield_acceleration
-    slides = slides_up or block.amplitude * path.highest > block.yield_acceleration
-    if slides_up and mode == eq.STUCK:
-        mode = eq.STICK_SLIP
-    if block.validity & NO_VALUE == 0 and slides:
-        if block.residual_mu <= block.tan_theta or block.fast_mu <= block.tan_theta:
-            block.validity |= flags.MAY_NOT_STOP
-        if not block.recorded and yield_governs_wave(law, block, path):
-            block.validity = flags.without_estimates(block.validity | flags.YIELD_GOVERNS)
-        walk_cycles(law, block, path, steps, log)
-        if law.is_strength and block.is_newmark:
-            run_out_by_strength(law, block, path, steps, log)
-        else:
-            run_out(block, path, log)
-    validity = flags.settled(block.validity, block.displacement, peak)
-    if block.slides_up:
-        validity &= ~flags.UPSLOPE  # no caution for a block that slides both ways
+@scalar
+def write_results(block: Block, mode: int, validity: int, result: np.ndarray) -> None:
+    """Write what was found of a cell, (`block.RESULTS`,)."""
+    result[3] = float(validity)
     if validity & NO_VALUE:
-        result[:] = -1.0
-        result[0] = result[1] = math.nan
+        result[:3] = math.nan
+        result[2] = -1.0
+        result[4:7] = -1.0
         result[7:] = math.nan
-        result[3] = float(validity)
         return
     result[0] = block.displacement
     result[1] = block.largest_velocity
     result[2] = float(mode)
-    result[3] = float(validity)
     result[4] = block.slips
     result[5] = block.stick_slip_pulses
     result[6] = block.continuous_pulses
@@ -336,9 +307,34 @@ def solve_cells(
     log: np.ndarray,
     results: np.ndarray,
 ) -> None:
-    """Step the cells of a tile with a friction law, as `solve_steps` does with that of the paper."""
+    """Step the cells of a tile through the shaking, and on to rest, with a friction law.
+
+    Arguments are those of `solve_steps`, which does so with the law of the paper.
+    """
+    block = blocks[0]
     for j in range(cells.size):
-        solve_cell(law, blocks[0], cells[j], options, path, steps, log, results[:, j])
+        put_at_rest(law, block, cells[j], options)
+        block.validity = validity_before(block, path)
+        mode = block.mode
+        peak = block.amplitude * max(path.highest, -path.lowest)
+        slides_up = block.amplitude * -path.lowest > block.upslope_yield_acceleration
+        slides = slides_up or block.amplitude * path.highest > block.yield_acceleration
+        if slides_up and mode == eq.STUCK:
+            mode = eq.STICK_SLIP
+        if block.validity & NO_VALUE == 0 and slides:
+            if block.residual_mu <= block.tan_theta or block.fast_mu <= block.tan_theta:
+                block.validity |= flags.MAY_NOT_STOP
+            if not block.recorded and yield_governs_wave(law, block, path):
+                block.validity = flags.without_estimates(block.validity | flags.YIELD_GOVERNS)
+            walk_cycles(law, block, path, steps, log)
+            if law.is_strength and block.is_newmark:
+                run_out_by_strength(law, block, path, steps, log)
+            else:
+                run_out(block, path, log)
+        validity = flags.settled(block.validity, block.displacement, peak)
+        if block.slides_up:
+            validity &= ~flags.UPSLOPE  # no caution for a block that slides both ways
+        write_results(block, mode, validity, results[:, j])
 
 
 @kernel

@@ -206,7 +206,9 @@ class _History:
         """Return the steps that are taken, of dtype `step.LOG`."""
         polarity = 1.0 if self.record is None else float(self.inputs["polarity"])
         stepper = solvers.stepper_of(self.problem, self.options, polarity)
-        cells = np.full((1, len(step_cells.STEP_CELL.names or ())), math.nan).view(step_cells.STEP_CELL)[:, 0]
+        cells = np.full((1, len(step_cells.STEP_CELL.names or ())), math.nan).view(
+            step_cells.STEP_CELL
+        )[:, 0]
         for name, value in self.fields.items():
             cells[name] = value
         results = np.empty((len(RESULTS), 1))
