@@ -21,6 +21,7 @@ import slipsweep
 from slipsweep.files import spec
 from slipsweep.model.choices import declared
 from slipsweep.model.options import MODELS, SOLVERS
+from slipsweep.model.parameter_table import PARAMETER_TABLE
 from slipsweep.model.variables import DIMENSION_ORDER, Validity
 from slipsweep.motion.reading import Reading
 from slipsweep.motion.waveforms import WAVEFORMS
@@ -370,6 +371,17 @@ def test_keys_are_those_of_the_schema(heading: str) -> None:
             assert stated == "–", name
         elif default is not None:
             assert stated.replace('"', "'") == repr(default), name
+
+
+def test_units_and_bounds_of_parameters_are_those_of_the_program() -> None:
+    """A document with other numbers would promise values that are then refused."""
+    table = rows(section("docs/sweep-files.md", "## `[axes.NAME]`"))
+    stated = {row[0].strip("`"): (row[1].strip("`"), row[2]) for row in table if row[1] != "type"}
+    for row in PARAMETER_TABLE:
+        if row.name != "polarity":  # a key of [excitation]
+            unit, allowed = stated[row.name]
+            assert unit == row.units, row.name
+            assert allowed == row.bound.brief, row.name
 
 
 def test_published_equations_are_those_of_the_program() -> None:

@@ -19,7 +19,7 @@ from slipsweep.errors import InputError, RunError
 from slipsweep.files import running, spec, storing
 from slipsweep.files.jobs import Job, limit_job, sweep_job
 from slipsweep.files.opening import read_result
-from slipsweep.grid.tally import tally_of
+from slipsweep.studies.result_counts import tally_of
 from tests.support.commands import command
 from tests.support.made_up_records import write_motion
 
@@ -174,14 +174,14 @@ def test_a_run_goes_on_with_its_own_chunks_only(
     monkeypatch.setattr(running, "CHUNK_CELLS", 2)  # as with workers
     assert not stored(
         job_of(folder, "sweep"), path, resume=True
-    ).found  # with the chunks it was begun with
+    ).was_complete  # with the chunks it was begun with
     assert sorted(seen) == list(range(24))
     stored(job_of(folder, "sweep"), folder / "whole.nc")
     xr.testing.assert_identical(
         without_time(read_result(path)), without_time(read_result(folder / "whole.nc"))
     )
 
-    assert stored(job_of(folder, "sweep"), path, resume=True).found
+    assert stored(job_of(folder, "sweep"), path, resume=True).was_complete
     with pytest.raises(InputError, match="is of another sweep or version; give --overwrite"):
         stored(job_of(folder, "newmark"), path, resume=True)
     with pytest.raises(InputError, match="exists already; give --overwrite"):
@@ -215,7 +215,7 @@ def test_a_run_goes_on_with_other_memory_if_its_chunks_fit(
         InputError, match="larger chunks than fit into the memory asked for; give more --memory"
     ):
         stored(job_of(folder, "sweep"), path, resume=True, memory=1000 * cell)
-    assert not stored(job_of(folder, "sweep"), path, resume=True, memory=7200 * cell).found
+    assert not stored(job_of(folder, "sweep"), path, resume=True, memory=7200 * cell).was_complete
     assert marked == [2]
     monkeypatch.undo()
     stored(job_of(folder, "sweep"), folder / "whole.nc")
@@ -307,7 +307,7 @@ def test_a_store_at_an_address(folder: Path) -> None:
     xr.testing.assert_identical(
         without_time(read_result(address)), without_time(read_result(folder / "a.nc"))
     )
-    assert stored(job_of(folder, "sweep"), address, resume=True).found
+    assert stored(job_of(folder, "sweep"), address, resume=True).was_complete
     assert not list(Path().glob(".address*"))
     with pytest.raises(InputError, match=r"nowhere://a/b\.zarr: Protocol not known: nowhere"):
         stored(job_of(folder, "sweep"), "nowhere://a/b.zarr")

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from slipsweep.grid.tally import Tally
 from slipsweep.model.options import (
     MODELS,
     SOLVERS,
@@ -33,6 +32,7 @@ from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import WAVEFORMS, peak_acceleration
 from slipsweep.studies.datasets import friction_parameters, sweep
+from slipsweep.studies.result_counts import Tally
 from slipsweep.studies.upslope import sliding_ways, upslope_yield_acceleration
 
 #: Amplitudes of a motion.

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from slipsweep.explore.excerpt import Excerpt, evenly, thinned_lengths
 from slipsweep.grid import engine, plans, solvers
-from slipsweep.grid.inputs import Inputs, Problem
+from slipsweep.grid.inputs import Problem
 from slipsweep.kernels.history import History
 from slipsweep.model.options import MODELS, Cycle, changing_strength
 from slipsweep.model.variables import VALUELESS
@@ -91,7 +91,7 @@ def compute_histories(excerpt: Excerpt, most_bytes: int) -> Histories | None:
     }
     motion = replace(motion, cycles=cycles)
     model = MODELS.from_attributes(table.attrs)
-    at_one = Inputs(**given, frequency=1.0 / (2.0 * math.pi))  # ω = 1 rad/s
+    at_one = {**given, "frequency": 1.0 / (2.0 * math.pi)}  # ω = 1 rad/s
     plan = plans.plan_sweep(at_one, excitation=motion, model=model, variables=("validity",))
     has_values = (plan.solve()["validity"].variable.set_dims(left).values & VALUELESS) == 0
     problem = Problem(model, motion, Cycle())

@@ -21,6 +21,7 @@ from slipsweep.jit.decorators import inlined, registered, scalar, single
 from slipsweep.kernels import block as flags
 from slipsweep.kernels.block import EQ12, LITERAL, MONOTONE, NO_VALUE, Cell, Interface
 from slipsweep.model import equations as eq
+<<<<<<< HEAD
 from slipsweep.motion.paths import Path, Piece
 
 #: Rules by which steps are taken: Euler's, Heun's and that of Runge and Kutta, which is Simpson's
@@ -28,6 +29,15 @@ from slipsweep.motion.paths import Path, Piece
 RECTANGLE = 0
 TRAPEZOID = 1
 SIMPSON = 2
+=======
+from slipsweep.model.options import StepRule
+from slipsweep.motion.paths import TERMS, Base, Path
+
+#: Rules by which steps are taken (`model.options.StepRule`).
+RECTANGLE = int(StepRule.RECTANGLE)
+TRAPEZOID = int(StepRule.TRAPEZOID)
+SIMPSON = int(StepRule.SIMPSON)
+>>>>>>> params
 
 #: Stages of the rules: each evaluates the rate at a node, a part of the step, from the second on
 #: reached with the rate of the stage before it; their weights in the gain of V, over h, and of W,

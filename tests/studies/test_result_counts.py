@@ -7,9 +7,9 @@ import pytest
 import xarray as xr
 
 from slipsweep.errors import InputError
-from slipsweep.grid import tally
-from slipsweep.grid.tally import Ratios, tally_of
 from slipsweep.model.variables import SensitivityStatus, SlidingMode, Validity
+from slipsweep.studies import result_counts
+from slipsweep.studies.result_counts import Ratios, tally_of
 
 MODES = [[0, 1, 1], [2, -1, 1]]
 FLAGS = [[0, 16, 16 | 1024], [512, 1, 0]]
@@ -25,7 +25,7 @@ def table(**more: object) -> xr.Dataset:
 def test_modes_and_flags_are_counted_once_in_chunks(
     cells: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(tally, "CHUNK_CELLS", cells)
+    monkeypatch.setattr(result_counts, "CHUNK_CELLS", cells)
     found = tally_of(table())
     assert found.cells == 6
     assert found.modes == {
