@@ -21,13 +21,8 @@ from slipsweep.grid.chunks import Chunk, grid_chunks, sizes_within, variables_wi
 from slipsweep.grid.flexible import flag_flexible_blocks
 from slipsweep.grid.inputs import Problem
 from slipsweep.kernels.block import UNSOLVED, Cell
-<<<<<<< HEAD
 from slipsweep.kernels.step_cells import STRENGTH_FIELDS
-from slipsweep.model import variables as known
-=======
-from slipsweep.kernels.step import STRENGTH_FIELDS
 from slipsweep.model import variables
->>>>>>> params
 from slipsweep.model.options import changing_strength, slides_both_ways
 from slipsweep.model.parameters import number_text
 from slipsweep.motion.intensity import strength_factor

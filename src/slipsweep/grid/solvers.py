@@ -11,12 +11,7 @@ from typing import Any, NamedTuple, TypeGuard
 import numpy as np
 
 from slipsweep.grid.inputs import Problem
-<<<<<<< HEAD
-from slipsweep.kernels import block as physics
-from slipsweep.kernels import history, newmark, newmark_record, step, step_cells, strength
-=======
-from slipsweep.kernels import block, history, newmark, newmark_record, step, strength
->>>>>>> params
+from slipsweep.kernels import block, history, newmark, newmark_record, step, step_cells, strength
 from slipsweep.kernels.grid import CELL, find_parameters
 from slipsweep.kernels.newmark_history import fill_newmark_history
 from slipsweep.kernels.sine.solve import solve_sine
@@ -128,33 +123,7 @@ def walk_solver(motion: Waveform | Record, options: block.Options, polarity: flo
     def solve(cells: np.ndarray, results: np.ndarray) -> None:
         solve_walk(cells, options, path, *workspace_of(), results)
 
-<<<<<<< HEAD
-    def under_sine(cells: np.ndarray, results: np.ndarray) -> None:
-        if solve_sine(cells, options, results):
-            left = np.flatnonzero(results[ROWS["validity"]] == physics.UNSOLVED)
-            found = np.empty((len(physics.Motion._fields), left.size))
-            under_wave(cells[left], found)
-            results[:, left] = found
-
-    if isinstance(problem.solver, Step):
-        stepper = stepper_of(problem, options, polarity)
-        no_log = np.empty(0, step.LOG)
-        return Solver(
-            lambda cells, results: stepper(cells, no_log, results),
-            ROWS_WITH_EXTREMES,
-            step_cells.STEP_CELL,
-        )
-    if isinstance(motion, Record):
-        path = cutting.path_of_record(motion, polarity)
-        return Solver(
-            lambda cells, results: solve_walk(cells, options, path, *workspace_of(), results), ROWS
-        )
-    assert isinstance(motion, Waveform)
-    in_batches = is_plain_sine(motion) and not problem.walked
-    return Solver(under_sine if in_batches else under_wave, ROWS)
-=======
     return Solver(solve, ROWS)
->>>>>>> params
 
 
 def step_solver(problem: Problem, options: block.Options, polarity: float) -> Solver:
@@ -165,7 +134,7 @@ def step_solver(problem: Problem, options: block.Options, polarity: float) -> So
     def solve(cells: np.ndarray, results: np.ndarray) -> None:
         take_steps(cells, no_log, results)
 
-    return Solver(solve, ROWS_WITH_EXTREMES, step.STEP_CELL)
+    return Solver(solve, ROWS_WITH_EXTREMES, step_cells.STEP_CELL)
 
 
 def newmark_solver(problem: Problem, options: block.Options, polarity: float) -> Solver:
@@ -241,13 +210,9 @@ def fill_history(
 def stepper_of(
     problem: Problem, options: block.Options, polarity: float
 ) -> Callable[[np.ndarray, np.ndarray, np.ndarray], Any]:
-<<<<<<< HEAD
-    """What solves cells by steps: cells, of dtype `step_cells.STEP_CELL`, a log and results.
-=======
     """Return a function that solves cells in steps; it returns the block of the last cell.
->>>>>>> params
 
-    Its arguments are cells of dtype `step.STEP_CELL`, a log, and results.
+    Its arguments are cells of dtype `step_cells.STEP_CELL`, a log, and results.
     """
     assert isinstance(problem.solver, Step)
     rule = int(StepRule[problem.solver.rule.upper()])

@@ -18,26 +18,31 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from slipsweep.jit.decorators import inlined, registered, scalar, single
-from slipsweep.kernels import block as flags
-from slipsweep.kernels.block import EQ12, LITERAL, MONOTONE, NO_VALUE, Cell, Interface
+from slipsweep.kernels.block import (
+    EQ12,
+    FRICTION_ESTIMATED,
+    FRICTION_NOT_DECAYING,
+    KD_NOT_POSITIVE,
+    LITERAL,
+    MONOTONE,
+    NEAR_MODE_LIMIT,
+    NO_VALUE,
+    NOT_RECOUPLED,
+    YIELD_GOVERNS,
+    Cell,
+    Interface,
+    decay_rate_of,
+    interface_of,
+)
 from slipsweep.model import equations as eq
-<<<<<<< HEAD
+from slipsweep.model.options import StepRule
 from slipsweep.motion.paths import Path, Piece
 
 #: Rules by which steps are taken: Euler's, Heun's and that of Runge and Kutta, which is Simpson's
 #: where friction does not depend on the motion.  Their errors are of the orders 1, 2 and 4.
-RECTANGLE = 0
-TRAPEZOID = 1
-SIMPSON = 2
-=======
-from slipsweep.model.options import StepRule
-from slipsweep.motion.paths import TERMS, Base, Path
-
-#: Rules by which steps are taken (`model.options.StepRule`).
 RECTANGLE = int(StepRule.RECTANGLE)
 TRAPEZOID = int(StepRule.TRAPEZOID)
 SIMPSON = int(StepRule.SIMPSON)
->>>>>>> params
 
 #: Stages of the rules: each evaluates the rate at a node, a part of the step, from the second on
 #: reached with the rate of the stage before it; their weights in the gain of V, over h, and of W,
@@ -593,7 +598,7 @@ def end_positive_half_wave(block: Block) -> None:
     if block.phase == HELD or block.phase == FOLLOWS:
         block.phase = ATTENUATES if block.recoupling == EQ12 else HELD_ON
         if block.held <= 0.0:
-            block.validity |= flags.KD_NOT_POSITIVE
+            block.validity |= KD_NOT_POSITIVE
 
 
 @scalar
@@ -726,10 +731,10 @@ def set_friction(block: Block, peak: float) -> Interface:
         block.given_delta_mu,
         block.given_minimum_friction,
     )
-    interface = flags.interface_of(parameters, block.rise, block.g)
+    interface = interface_of(parameters, block.rise, block.g)
     block.yield_acceleration = interface.yield_acceleration
     block.delta_mu = interface.delta_mu
-    block.decay_rate = flags.decay_rate_of(
+    block.decay_rate = decay_rate_of(
         parameters, interface.delta_mu, interface.minimum_friction, block.g
     )
     block.mode = interface.sliding_mode
@@ -754,8 +759,8 @@ def set_friction_of_pulse(law: Law, block: Block, peak: float) -> None:
         return
     interface = set_friction(block, peak)
     near = 0.9 <= interface.acceleration_ratio <= 1.1
-    block.validity |= interface.validity & flags.FRICTION_NOT_DECAYING
-    block.validity |= flags.NEAR_MODE_LIMIT if near else 0
+    block.validity |= interface.validity & FRICTION_NOT_DECAYING
+    block.validity |= NEAR_MODE_LIMIT if near else 0
     block.mode = eq.STICK_SLIP
     if peak > interface.limiting_acceleration:
         block.mode = eq.CONTINUOUS
@@ -763,10 +768,10 @@ def set_friction_of_pulse(law: Law, block: Block, peak: float) -> None:
         block.stick_slip_pulses -= 1.0
         block.continuous_pulses += 1.0
     elif yield_governs(law, block, block.yield_acceleration, peak):
-        block.validity |= flags.YIELD_GOVERNS
+        block.validity |= YIELD_GOVERNS
         return
     if math.isnan(block.given_decay_rate) or math.isnan(block.given_delta_mu):
-        block.validity |= flags.FRICTION_ESTIMATED
+        block.validity |= FRICTION_ESTIMATED
 
 
 @scalar
@@ -808,7 +813,7 @@ def enter_piece(
 def begin_pulse(law: Law, block: Block, piece: Piece, tau: float, peak: float) -> None:
     """Go on from where Üg reaches Üy in a half wave; at rest the block waits for t1."""
     if block.mode == eq.STICK_SLIP and block.velocity > 0.0 and not block.is_newmark:
-        block.validity |= flags.NOT_RECOUPLED  # Eq. 12 has not brought it to rest
+        block.validity |= NOT_RECOUPLED  # Eq. 12 has not brought it to rest
     if block.recorded:
         set_friction_of_pulse(law, block, peak)
     block.in_pulse = 1

@@ -7,8 +7,24 @@ from numpy.typing import NDArray
 
 from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import registered, scalar, single
-from slipsweep.kernels import block as flags
-from slipsweep.kernels.block import NEWMARK, NO_VALUE, Cell, Options
+from slipsweep.kernels.block import (
+    FRICTION_ESTIMATED,
+    LIMIT_UNDEFINED,
+    MAY_NOT_STOP,
+    NEAR_MODE_LIMIT,
+    NEWMARK,
+    NO_VALUE,
+    NOT_AT_REST,
+    STATICALLY_UNSTABLE,
+    UPLIFT,
+    UPSLOPE,
+    YIELD_GOVERNS,
+    Cell,
+    Options,
+    given_or,
+    settled,
+    without_estimates,
+)
 from slipsweep.kernels.step import (
     ATTENUATES,
     BLOCK,
@@ -201,7 +217,7 @@ def run_out_by_strength(law: Law, block: Block, path: Path, steps: Steps, log: n
             rest(block)  # where the strength that is left is just what holds it
         p += 1
     if block.phase != STUCK or resistance(law, block, 1.0, 0.0, block.slip) < 0.0:
-        block.validity |= flags.NOT_AT_REST
+        block.validity |= NOT_AT_REST
 
 
 # ------------------------------------------------------------------ a cell
@@ -226,12 +242,12 @@ def validity_before(block: Block, path: Path) -> int:
         if block.amplitude * path.highest > block.yield_acceleration:
             return interface.validity
         # ramps keep the shaking below Üy
-        return interface.validity & ~(flags.NEAR_MODE_LIMIT | flags.FRICTION_ESTIMATED)
+        return interface.validity & ~(NEAR_MODE_LIMIT | FRICTION_ESTIMATED)
     peak = block.amplitude * max(path.highest, -path.lowest)
     interface = set_friction(block, peak)
     lowest = eq.normal_acceleration(block.amplitude * path.lowest, block.tan_theta, block.g)
-    uplift = flags.UPLIFT if lowest <= 0.0 and not block.is_newmark else 0
-    return uplift | interface.validity & (flags.STATICALLY_UNSTABLE | flags.LIMIT_UNDEFINED)
+    uplift = UPLIFT if lowest <= 0.0 and not block.is_newmark else 0
+    return uplift | interface.validity & (STATICALLY_UNSTABLE | LIMIT_UNDEFINED)
 
 
 @scalar
@@ -244,7 +260,7 @@ def put_at_rest(law: Law, block: Block, cell: np.record, options: Options) -> No
     block.given_decay_rate = cell.decay_rate
     block.given_delta_mu = cell.delta_mu
     block.given_minimum_friction = cell.minimum_friction
-    block.upslope_yield_acceleration = flags.given_or(cell.upslope_yield_acceleration, math.inf)
+    block.upslope_yield_acceleration = given_or(cell.upslope_yield_acceleration, math.inf)
     block.slides_up = 0 if math.isnan(cell.upslope_yield_acceleration) else 1
     block.residual_mu = cell.residual_mu
     block.weakening_distance = cell.weakening_distance
@@ -252,7 +268,7 @@ def put_at_rest(law: Law, block: Block, cell: np.record, options: Options) -> No
     block.rate_constant = cell.rate_constant
     block.weakens_until = 0.0
     if law.knows_slip:
-        distance = flags.given_or(cell.weakening_distance, math.inf)
+        distance = given_or(cell.weakening_distance, math.inf)
         block.weakens_until = distance / (cell.seconds * cell.seconds)
     block.g = options.g
     block.seconds = cell.seconds
@@ -323,17 +339,17 @@ def solve_cells(
             mode = eq.STICK_SLIP
         if block.validity & NO_VALUE == 0 and slides:
             if block.residual_mu <= block.tan_theta or block.fast_mu <= block.tan_theta:
-                block.validity |= flags.MAY_NOT_STOP
+                block.validity |= MAY_NOT_STOP
             if not block.recorded and yield_governs_wave(law, block, path):
-                block.validity = flags.without_estimates(block.validity | flags.YIELD_GOVERNS)
+                block.validity = without_estimates(block.validity | YIELD_GOVERNS)
             walk_cycles(law, block, path, steps, log)
             if law.is_strength and block.is_newmark:
                 run_out_by_strength(law, block, path, steps, log)
             else:
                 run_out(block, path, log)
-        validity = flags.settled(block.validity, block.displacement, peak)
+        validity = settled(block.validity, block.displacement, peak)
         if block.slides_up:
-            validity &= ~flags.UPSLOPE  # no caution for a block that slides both ways
+            validity &= ~UPSLOPE  # no caution for a block that slides both ways
         write_results(block, mode, validity, results[:, j])
 
 
