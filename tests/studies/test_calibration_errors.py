@@ -15,8 +15,8 @@ import slipsweep
 from benchmarks.calibration import drawn, sensed
 from slipsweep.model.options import Mendez
 from slipsweep.motion.shaking import CHANNELS, ShakingTest
-from slipsweep.studies.calibration import calibrate
-from slipsweep.studies.likelihood import Observation
+from slipsweep.studies.calibration.calibrate import calibrate
+from slipsweep.studies.calibration.likelihood import Observation
 from tests.support.shaking import SOUGHT, coloured
 
 #: Standard deviations of a normal distribution to the ends of 95 %.

@@ -13,7 +13,7 @@ import slipsweep
 from slipsweep import InputError
 from slipsweep.model import equations
 from slipsweep.motion.shaking import read_test
-from slipsweep.studies.friction import _mean, eq1_friction
+from slipsweep.studies.calibration.measured_friction import _mean, eq1_friction
 from tests.support.shaking import CONTINUOUS, STICK_SLIP, coulomb, exact, measured
 
 GIVEN = {"theta": STICK_SLIP["theta"], "mu_s": STICK_SLIP["mu_s"]}

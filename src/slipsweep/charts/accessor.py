@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Literal
 
 import xarray as xr
 
-from slipsweep.studies.decoding import flags
+from slipsweep.studies.flags import flags
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

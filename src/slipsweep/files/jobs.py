@@ -120,7 +120,7 @@ def limit_job(
 
 def strength_job(spec: SweepSpec, displacement: float | list[float], of: str) -> Job:
     """Return the job of `slipsweep limit --of`: strengths that displacements (m) require."""
-    from slipsweep.studies import strength  # imports numba
+    from slipsweep.studies import required_strength  # imports numba
 
     # the strength is solved for; without θ the yield coefficient needs no interface
     replaced = dict.fromkeys(("mu_s", "phi", "yield_acceleration", "yield_coefficient"))
@@ -130,7 +130,7 @@ def strength_job(spec: SweepSpec, displacement: float | list[float], of: str) ->
     replaced |= dict.fromkeys(("structure_frequency", "decay_rate", "delta_mu"))
     replaced |= dict.fromkeys(("minimum_friction",))
     with named(spec.source):
-        plan = strength.plan_strength(
+        plan = required_strength.plan_strength(
             displacement,
             replace(spec.inputs, **replaced),
             of=of,
@@ -139,4 +139,4 @@ def strength_job(spec: SweepSpec, displacement: float | list[float], of: str) ->
             sampling=spec.sampling,
         )
     options = {"--displacement": displacement, "--of": of}
-    return Job(spec, plan, strength.TITLE, options)
+    return Job(spec, plan, required_strength.TITLE, options)

@@ -28,7 +28,7 @@ from slipsweep.model import options, parameters, units, variables
 from slipsweep.model.variables import LimitStatus, Validity
 from slipsweep.motion.cutting import wave_of_record
 from slipsweep.motion.records import Record
-from slipsweep.studies import criterion, datasets
+from slipsweep.studies import datasets, limited_displacement
 from slipsweep.studies.datasets import Values
 
 Floats = NDArray[np.float64]
@@ -224,7 +224,7 @@ def plan_limits(
             "title": TITLE,
             "maximum_amplitude": highest,
             "amplitude_steps": steps,
-            **criterion.attributes_of(request.problem.model),
+            **limited_displacement.attributes_of(request.problem.model),
         },
         # one scan of a block serves all its targets, each of which takes some 100 cells in addition
         cost=plan.cost * (max(1.0, steps / math.prod(scaled.values())) + 100.0),
@@ -288,8 +288,8 @@ def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> dict[
     results["limit_status"][:] = np.where(valueless, LimitStatus.INVALID, LimitStatus.NOT_REACHED)
     for name, values in {**after, "limit_amplitude": high}.items():
         results[name][cell] = values
-    below = criterion.displacement_of(before)
-    above = criterion.displacement_of(after)
+    below = limited_displacement.displacement_of(before)
+    above = limited_displacement.displacement_of(after)
     with np.errstate(invalid="ignore"):
         jumps = (above - below > JUMP * above) | np.isinf(above)  # it does not come to rest
     modes = [
@@ -317,7 +317,7 @@ class Scan:
         # are solved once
         every = inputs | {"amplitude": amplitudes}
         slips = ("number_of_slips",) if isinstance(self.problem.excitation, Record) else ()
-        self.moved = criterion.results_of(self.problem.model)
+        self.moved = limited_displacement.results_of(self.problem.model)
         wanted = (*self.moved, "validity", *slips)
         found = engine.solve(Request(self.problem, grid_sizes(every), every, wanted))
         full = {**request.sizes, _ALONG: amplitudes.sizes[_ALONG]}
@@ -328,7 +328,7 @@ class Scan:
         }
         self.amplitudes = self.found["amplitude"]
         #: Displacements that are compared with those to be reached, (cell, amplitude).
-        self.displacements = criterion.displacement_of(self.found)
+        self.displacements = limited_displacement.displacement_of(self.found)
         #: Displacements to be reached, (cell,).
         self.targets = displacement.set_dims(request.sizes).values.ravel()
         #: Inputs but for the amplitude: one value for each cell, or one for all.
@@ -353,7 +353,7 @@ class Scan:
 
     def reach(self, amplitude: Floats, cell: Indices) -> NDArray[np.bool_]:
         """Return True where cells reach their targets at amplitudes of their own."""
-        moved = criterion.displacement_of(self.solve(amplitude, cell, self.moved))
+        moved = limited_displacement.displacement_of(self.solve(amplitude, cell, self.moved))
         return np.asarray(moved >= self.targets[cell].reshape(-1, *(1,) * (amplitude.ndim - 1)))
 
 

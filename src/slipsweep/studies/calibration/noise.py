@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from slipsweep.studies.friction import Floats, noise_of
+from slipsweep.studies.calibration.measured_friction import Floats, noise_of
 
 #: The least noise that a channel is taken to have, in parts of its largest value: neither a spline
 #: through samples nor a sensor is better.

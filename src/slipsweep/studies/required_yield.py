@@ -25,7 +25,7 @@ from slipsweep.grid.solvers import cost_of
 from slipsweep.model.options import slides_both_ways
 from slipsweep.model.variables import StrengthStatus
 from slipsweep.motion.records import Record
-from slipsweep.studies import criterion
+from slipsweep.studies import limited_displacement
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -204,9 +204,11 @@ class Scan:
         # where the base does not move a block, every yield acceleration is as good
         onset = np.where(peak > 0.0, peak, 1.0) / (1.0 + np.exp(-x))
         inputs["yield_acceleration"] = xr.Variable("cell", onset)
-        wanted = criterion.results_of(self.problem.model)
+        wanted = limited_displacement.results_of(self.problem.model)
         results = engine.solve(Request(self.problem, {"cell": x.size}, inputs, wanted))
-        return criterion.displacement_of({name: one.values for name, one in results.items()})
+        return limited_displacement.displacement_of(
+            {name: one.values for name, one in results.items()}
+        )
 
     def required(self, block: Indices, target: Floats) -> tuple[Floats, NDArray[np.int8]]:
         """Return the required r of cells (0: any, NaN: none), and their status."""

@@ -13,8 +13,8 @@ from scipy.interpolate import BSpline, make_lsq_spline
 from scipy.linalg import block_diag, cho_solve_banded, cholesky, cholesky_banded, solve_triangular
 from scipy.sparse import csr_array, diags_array, hstack
 
-from slipsweep.studies.friction import Floats, noise_of
-from slipsweep.studies.noise import (
+from slipsweep.studies.calibration.measured_friction import Floats, noise_of
+from slipsweep.studies.calibration.noise import (
     COLOURS,
     LEAST_NOISE,
     colour_of,

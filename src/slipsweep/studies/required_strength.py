@@ -14,11 +14,11 @@ from slipsweep.grid import inputs as grid_inputs
 from slipsweep.grid.engine import Request
 from slipsweep.model import options, parameters, variables
 from slipsweep.model.variables import StrengthStatus
-from slipsweep.studies import criterion, datasets
+from slipsweep.studies import datasets, limited_displacement
 from slipsweep.studies.datasets import Values
 from slipsweep.studies.limits import check_displacement
+from slipsweep.studies.required_yield import SCAN_MEMORY, yield_accelerations
 from slipsweep.studies.sampling import Floats, Sampling, check_increasing
-from slipsweep.studies.strength_roots import SCAN_MEMORY, yield_accelerations
 from slipsweep.studies.suite_statistics import QUANTILES, SUITE, THRESHOLDS
 from slipsweep.studies.uncertainty import check_drawn
 
@@ -226,7 +226,7 @@ def plan_strength(
         "required": of,
         "friction_inputs": f"Üy solved for{';' if source else ''}{source}",
     }
-    attrs |= criterion.attributes_of(problem.model)
+    attrs |= limited_displacement.attributes_of(problem.model)
     if sampling is not None:
         sampling.check_draws(coords)
         attrs |= sampling.attributes

@@ -16,9 +16,9 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.optimize import brentq, least_squares
 
+from slipsweep.studies.calibration.likelihood import SOUGHT, Observation, runs_of
+from slipsweep.studies.calibration.measured_friction import QUANTILE, Floats
 from slipsweep.studies.datasets import sweep
-from slipsweep.studies.friction import QUANTILE, Floats
-from slipsweep.studies.likelihood import SOUGHT, Observation, runs_of
 
 #: What decides the block's acceleration, of each test.
 Readings = tuple[str, ...]

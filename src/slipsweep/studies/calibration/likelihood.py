@@ -26,8 +26,8 @@ from slipsweep.model.variables import HISTORY
 from slipsweep.motion.cutting import path_of_record
 from slipsweep.motion.records import Record
 from slipsweep.motion.shaking import RESPONSES, TABLE, ShakingTest, check_channels
-from slipsweep.studies.friction import Floats, check_contact, noise_of
-from slipsweep.studies.noise import (
+from slipsweep.studies.calibration.measured_friction import Floats, check_contact, noise_of
+from slipsweep.studies.calibration.noise import (
     LEAST_NOISE,
     colour_of,
     converter_noise,
@@ -35,7 +35,7 @@ from slipsweep.studies.noise import (
     is_first_order,
     whitened,
 )
-from slipsweep.studies.table import table_motion
+from slipsweep.studies.calibration.table_motion import table_motion
 
 #: The series of `HISTORY` at some times, for Üy, λ and Δμ.
 Forward = Callable[[Floats, Floats], Mapping[str, Floats]]

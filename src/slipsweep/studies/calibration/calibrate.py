@@ -11,11 +11,24 @@ from threadpoolctl import threadpool_limits
 from slipsweep.errors import InputError
 from slipsweep.model import options, parameters, variables
 from slipsweep.motion.shaking import TABLE, ShakingTest
-from slipsweep.studies import friction
-from slipsweep.studies.estimate import Estimate, cycle_estimate, estimate
-from slipsweep.studies.friction import Floats
-from slipsweep.studies.likelihood import SOUGHT, Observation, runs_of
-from slipsweep.studies.noise import flat_top, noisy_flat_top
+from slipsweep.studies.calibration.estimate import Estimate, cycle_estimate, estimate
+from slipsweep.studies.calibration.likelihood import SOUGHT, Observation, runs_of
+from slipsweep.studies.calibration.measured_friction import (
+    BOUND,
+    NOISE_IN_THRESHOLD,
+    QUANTILE,
+    SOURCE,
+    Floats,
+    Test,
+    coefficients_of,
+    eq1_friction,
+    free_body_friction,
+    onset_acceleration,
+    slides_of,
+    test_of,
+    threshold_of,
+)
+from slipsweep.studies.calibration.noise import flat_top, noisy_flat_top
 
 #: The peak of a cycle at least, and what a table that moves exceeds, in parts of its largest
 #: acceleration; fewest samples of a cycle.
@@ -34,7 +47,7 @@ _ANOTHER = "Test at another amplitude and give calibrate all tests together"
 
 
 def calibrate(
-    test: friction.Test | Sequence[friction.Test],
+    test: Test | Sequence[Test],
     theta: float,
     mu_s: float | None = None,
     *,
@@ -107,7 +120,7 @@ def calibrate(
     >>> print(f"{found.yield_acceleration.item():.1f} m/s2, {found.decay_rate.item():.1f}, {found.delta_mu.item():.1f}")
     1.8 m/s2, 2.0, 0.1
     """
-    tests = [friction.test_of(one) for one in (test if isinstance(test, list | tuple) else [test])]
+    tests = [test_of(one) for one in (test if isinstance(test, list | tuple) else [test])]
     if not tests:
         raise InputError("test = []: must be one test at least")
     theta = parameters.check_single("theta", theta)
@@ -156,7 +169,7 @@ def calibrate(
         whole = whole.merge(_of_all(found)).assign(statics[0].variables)
     whole.attrs = {
         "title": "Calibration of a sliding block from tests on a shaking table",
-        **friction.SOURCE,
+        **SOURCE,
         **(tests[0].attrs if len(tests) == 1 else {"tests": ", ".join(one.name for one in tests)}),
         **options.MODELS.attributes(chosen),
         "removed": "; ".join(dict.fromkeys(one.attrs["removed"] for one in parts)),
@@ -177,10 +190,10 @@ def _of_test(one: Observation, found: Estimate, cycles: bool) -> xr.Dataset:
     series |= {f"computed_{name}": values for name, values in history.items()}
     block = _block_acceleration(test, channels)
     if block is not None:
-        series["friction_coefficient"] = friction.eq1_friction(
+        series["friction_coefficient"] = eq1_friction(
             channels[TABLE], block, one.theta, one.mu_s, one.model.g
         )
-        series["free_body_friction"] = friction.free_body_friction(block, one.theta, one.model.g)
+        series["free_body_friction"] = free_body_friction(block, one.theta, one.model.g)
     data: dict[str, Any] = {name: ("time", values, about[name]) for name, values in series.items()}
     for name, misfit in zip(one.channels, one.misfits(parameters), strict=True):
         span = max(float(np.nanmax(np.abs(history[name]))), 1e-300)
@@ -299,7 +312,7 @@ def _of_all(found: Estimate) -> xr.Dataset:
         name: (name, np.arange(3, dtype=np.int8), {"long_name": name.replace("_", " "), **codes})
         for name in pair
     }
-    coords["bound"] = friction.BOUND
+    coords["bound"] = BOUND
     for name in ("theta", "mu_s"):
         coords[name] = ((), getattr(found.observations[0], name), variables.PARAMETERS[name])
     return xr.Dataset(data, coords)
@@ -388,14 +401,14 @@ def _slides(
     one: Observation, found: Estimate, table: Floats, block: Floats
 ) -> tuple[list[slice], float]:
     """Return the slides of a test, and the threshold by which they are told from noise."""
-    threshold = friction.threshold_of(one.test.channels[TABLE], block)[0]
+    threshold = threshold_of(one.test.channels[TABLE], block)[0]
     if "block_acceleration" in one.channels:  # neighbours show too little of coloured noise
         row = one.channels.index("block_acceleration")
         noise = math.hypot(
             one.noise_seen(found.of_test(one))[row], one.motion.noise * (one.motion.colour > 0.0)
         )
-        threshold = max(threshold, friction.NOISE_IN_THRESHOLD * noise)
-    return friction.slides_of(one.test.times, table, block, threshold), threshold
+        threshold = max(threshold, NOISE_IN_THRESHOLD * noise)
+    return slides_of(one.test.times, table, block, threshold), threshold
 
 
 def _statics(one: Observation, found: Estimate) -> xr.Dataset:
@@ -405,7 +418,7 @@ def _statics(one: Observation, found: Estimate) -> xr.Dataset:
         return xr.Dataset(attrs={"constant_friction": ""})
     table = _smooth_table(one, found)
     slides, _ = _slides(one, found, table, block)
-    return friction.coefficients_of(table, block, slides, one.mu_s, one.theta, one.model.g)
+    return coefficients_of(table, block, slides, one.mu_s, one.theta, one.model.g)
 
 
 def _smooth_table(one: Observation, found: Estimate) -> Floats:
@@ -512,9 +525,7 @@ def _contradiction(found: Estimate, one: Observation) -> list[str]:
     block = _measured(one, found)["block_acceleration"]
     table = _smooth_table(one, found)
     slides, threshold = _slides(one, found, table, block)
-    onsets = np.array(
-        [friction.onset_acceleration(table, block, slide, threshold) for slide in slides]
-    )
+    onsets = np.array([onset_acceleration(table, block, slide, threshold) for slide in slides])
     onsets = onsets[onsets > 0.0]  # downslope
     if not onsets.size:
         return []
@@ -675,9 +686,7 @@ def _newmark_tables(one: Observation, coefficients: xr.Dataset) -> tuple[str, st
         f'[model]\nfriction = "newmark"\nyield_acceleration = {_number(value)}  # 95 %: {low:.4g} to {high:.4g} m/s2\n'
         f"g = {one.model.g:g}\n"
     )
-    lines = _normal(
-        "yield_acceleration", value, max((high - low) / (2.0 * friction.QUANTILE), 1e-6 * value)
-    )
+    lines = _normal("yield_acceleration", value, max((high - low) / (2.0 * QUANTILE), 1e-6 * value))
     return model, "\n".join(["[uncertainty]", *lines]) + "\n"
 
 
