@@ -14,7 +14,7 @@ from slipsweep.published import EQUATIONS, Estimate
 from slipsweep.studies.published_statistics import conditions_texts, estimates
 from slipsweep.studies.published_strength import strength_by
 
-#: Kinds of charts that draw them.
+#: Kinds of charts that draw published equations.
 KINDS = ("curve", "dimensionless", "motions", "intensity", "strength")
 
 #: Equations for N cycles of a period, which the dimensionless chart draws.
@@ -23,7 +23,7 @@ NORMALISED = tuple(name for name, one in EQUATIONS.items() if "cycles" in one.in
 #: Most equations that a chart can tell apart.
 _MOST = 5
 
-#: Colour, dash and marker of each: told apart without colour.
+#: Colour, dash and marker of each equation: told apart without colour.
 _COLOURS = ("#A8480A", "#1B7F5C", "#7B4FA0", "#444444", "#B0882A")
 _DASHES = (
     (0, (6, 2)),
@@ -151,7 +151,7 @@ def draw_strengths(sheet: Sheet, panel: Panel) -> None:
 
 
 def _names(sheet: Sheet) -> tuple[str, ...]:
-    """The equations that a chart was asked for (InputError: more than can be told apart)."""
+    """Return the equations of a chart (InputError: more than can be told apart)."""
     names = tuple(sheet.options.equations)
     if len(names) > _MOST:
         raise InputError(f"--equations: {len(names)}: a chart shows {_MOST} at most")
@@ -159,7 +159,7 @@ def _names(sheet: Sheet) -> tuple[str, ...]:
 
 
 def _along(estimate: Estimate, places: xr.DataArray) -> Estimate:
-    """The same as arrays along a dimension, on which it may not depend."""
+    """Return an estimate as arrays along a dimension, repeated if it does not depend on it."""
     bare = places.drop_vars([*places.coords])
     return Estimate(*(part.broadcast_like(bare).values for part in estimate))
 
@@ -231,7 +231,7 @@ def _draw_line(
 
 
 def _widen(panel: Panel, values: Floats) -> None:
-    """Extend a logarithmic ordinate upwards to show `values`, within the decades that it may have."""
+    """Extend a logarithmic ordinate upwards to show `values`, up to `_DECADES`."""
     low, high = panel.axes.get_ylim()
     if np.isfinite(values).any():
         top = min(1.5 * float(np.nanmax(values)), low * 10.0**_DECADES)
@@ -239,7 +239,7 @@ def _widen(panel: Panel, values: Floats) -> None:
 
 
 def _note(sheet: Sheet, names: tuple[str, ...]) -> None:
-    """Say, once, what the equations are for."""
+    """Add to the caption, once, the conditions that the equations are for."""
     magnitude = sheet.options.magnitude
     given = "" if magnitude is None else f" M = {magnitude:g}."
     text = f"{' '.join(conditions_texts(names))}{given}"

@@ -1,4 +1,4 @@
-"""Charts of what a displacement allows: limit amplitudes, required strengths, annual rates."""
+"""Charts of limit amplitudes, required strengths and annual rates of a displacement."""
 
 from dataclasses import replace
 
@@ -31,7 +31,10 @@ _MOST_MARKS = 20
 
 
 def limit(result: Result, options: Options) -> Figure:
-    """Limit amplitudes, in g, over one axis: a curve for each value of another; of a suite as `draw_suite`."""
+    """Draw limit amplitudes, in g, over one axis.
+
+    There is a curve for each value of another axis, or the motions of a suite (`draw_suite`).
+    """
     suite = SUITE if "motion" in result.dims else ()
     single = suite and not {*result.wide} - {*SUITE, *options.at}  # nothing varies but the motion
     along = "motion" if single else ("frequency", "mu_s", "theta", "displacement")
@@ -57,7 +60,7 @@ def limit(result: Result, options: Options) -> Figure:
 
 
 def _draw_curves(sheet: Sheet, panel: Panel) -> None:
-    """The curves of a family, in circles where a discontinuity of the model sets the limit."""
+    """Draw a family of curves, with circles where a discontinuity of the model sets the limit."""
     xs = panel.xs
     limits = panel.grid("limit_amplitude") / panel.g
     states = panel.grid("limit_status")
@@ -87,7 +90,7 @@ def _draw_family(sheet: Sheet, panel: Panel, values: Floats) -> None:
 
 
 def _draw_motions(sheet: Sheet, panel: Panel) -> None:
-    """The limits of the motions of a suite, with their median and band."""
+    """Draw the limits of the motions of a suite, with their median and band."""
     xs = panel.xs
     limits = panel.data["limit_amplitude"]
     quantiles = (
@@ -119,7 +122,7 @@ def _draw_points(
 
 
 def strength(result: Result, options: Options) -> Figure:
-    """Required strengths over one axis: of a suite or of samples with median and band."""
+    """Draw required strengths over one axis, of a suite or of samples with median and band."""
     of = str(result.attrs["required"])
     name = f"required_{of}"
     has_band = f"{name}_quantile" in result.variables
@@ -173,7 +176,7 @@ def _draw_required(sheet: Sheet, panel: Panel, name: str) -> None:
 
 
 def _required_text(data: xr.Dataset, has_band: bool) -> str:
-    """Return what the band is of, and how many no strength holds, or every one."""
+    """Return the caption: runs of the band, and how many stay within at any or no strength."""
     texts = []
     if has_band:
         runs = str(data.attrs.get("pooled", ""))
@@ -196,7 +199,7 @@ def _required_text(data: xr.Dataset, has_band: bool) -> str:
 
 
 def _suite_text(data: xr.Dataset) -> str:
-    """What the median is of, and the motions that have no limit."""
+    """Return the caption: motions of the median, and those that have no limit."""
     status = data["limit_status"].values
     beyond, invalid = (
         int(np.count_nonzero(status == one))
@@ -206,7 +209,8 @@ def _suite_text(data: xr.Dataset) -> str:
     if beyond:
         highest = f"{float(data.attrs['maximum_amplitude']) / float(data.attrs['g']):.4g} g"
         texts.append(
-            f"{beyond} of {status.size} limits are above {highest}; they count as larger than all others."
+            f"{beyond} of {status.size} limits are above {highest}; they count as larger than all "
+            "others."
         )
     if invalid:
         texts.append(f"{invalid} of {status.size} have no value and are left out.")
@@ -214,16 +218,16 @@ def _suite_text(data: xr.Dataset) -> str:
 
 
 def drawn_thresholds(data: xr.Dataset, requested: Floats) -> Floats:
-    """Displacements, m, that a curve of rates is drawn through: those requested, and as many as a smooth one needs."""
+    """Return displacements, m, of a smooth curve of rates, among them those requested."""
     most = max(np.nanmax(data["permanent_displacement"].values), requested[-1])
     least = min([one for one in requested if one > 0.0] + [most]) / 10.0
     return np.union1d(np.geomspace(least, most, 121) if most > 0.0 else [], requested)
 
 
 def hazard(result: Result, options: Options) -> Figure:
-    """The mean annual rate of exceedance over the displacement, a curve for each grid point.
+    """Draw the mean annual rate of exceedance over the displacement, a curve for each grid point.
 
-    The displacements that the attribute ``marked`` has, or all if they are few, have a marker.
+    The displacements of the attribute ``marked``, or all if they are few, have a marker.
     Curves are dotted where more than half of the rate is held above the largest amplitude.
     """
     rates = result.data

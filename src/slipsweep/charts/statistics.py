@@ -15,10 +15,10 @@ from slipsweep.files.selection import axis_labels
 from slipsweep.model.variables import PARAMETERS, STRENGTHS, SensitivityStatus
 from slipsweep.studies.solved_again import DRIVES
 
-#: What statistics are drawn over, in order of preference.
+#: Axes that statistics are drawn over, in order of preference.
 _AXES = (*DRIVES, *STRENGTHS)
 
-#: Sobol indices, and how they are drawn: name, interval, text, colour of bars.
+#: Sobol indices: name, interval, words, colour of bars.
 _INDICES = (
     ("total_index", "total_interval", "total", VERMILION),
     ("first_order_index", "first_order_interval", "first order", BLUE),
@@ -27,7 +27,7 @@ _FIRST_ORDER: Look = {"linestyle": (0, (3, 1.5)), "linewidth": 1.0}
 
 
 def fragility(result: Result, options: Options) -> Figure:
-    """The probability of exceeding a displacement over one axis, a curve for each threshold."""
+    """Draw the probability of exceeding a displacement over one axis, a curve a threshold."""
     if options.levels:
         raise InputError(
             f"{result.name}: levels: not with statistics, whose thresholds are those in the file"
@@ -37,7 +37,7 @@ def fragility(result: Result, options: Options) -> Figure:
 
 
 def draw_fragility(sheet: Sheet) -> Figure:
-    """Curves of `exceedance_probability` of a slice, and the share of samples without a value, where there are any."""
+    """Draw curves of `exceedance_probability`, and the share of samples without a value."""
     thresholds = sheet.data["threshold"]
     fixed = style.length_text(thresholds.item()) if thresholds.ndim == 0 else None
     symbol = style.displacement_symbol(sheet.data.attrs)
@@ -59,7 +59,7 @@ def draw_fragility(sheet: Sheet) -> Figure:
 
 
 def quantiles(result: Result, options: Options) -> Figure:
-    """Bands between quantiles of the permanent displacement over one axis."""
+    """Draw bands between quantiles of the permanent displacement over one axis."""
     sheet = result.sheet(
         options, ["displacement_quantile", "valueless_share"], _AXES, keep=["quantile"]
     )
@@ -90,10 +90,14 @@ def quantiles(result: Result, options: Options) -> Figure:
 
 
 def sensitivity(result: Result, options: Options) -> Figure:
-    """Sobol indices of every input with their 95 % intervals: curves over an axis, or bars at one grid point."""
+    """Draw Sobol indices of every input with their 95 % intervals.
+
+    They are curves over an axis, or bars at one grid point.
+    """
     if "total_index" not in result.variables:
         raise InputError(
-            f"{result.name}: holds no Sobol indices; sensitivity = true in [uncertainty] computes them"
+            f"{result.name}: holds no Sobol indices; sensitivity = true in [uncertainty] computes "
+            "them"
         )
     names = [name for one in _INDICES for name in one[:2]] + ["sensitivity_status"]
     left = [
@@ -142,7 +146,7 @@ def sensitivity(result: Result, options: Options) -> Figure:
 
 
 def _draw_bars(sheet: Sheet, symbols: list[str]) -> None:
-    """Both indices of every input, the largest total index first."""
+    """Draw both indices of every input as bars, the largest total index first."""
     order = np.argsort(sheet.data["total_index"].sum(sheet.along).values)
     for panel in sheet.panels:
         for (name, interval, text, colour), shift in zip(_INDICES, (0.2, -0.2), strict=True):
@@ -164,7 +168,10 @@ def _draw_bars(sheet: Sheet, symbols: list[str]) -> None:
 
 
 def _ends(sheet: Sheet, intervals: bool) -> tuple[float, float]:
-    """Ends of the axis of indices: 0 to 1 and what lies beyond, of intervals not more than half as much again."""
+    """Return the ends of the axis of indices, 0 and 1, or beyond if indices are.
+
+    Intervals extend it to −0.5 and 1.5 at most.
+    """
     values = [sheet.data[name].values.ravel() for name, *_ in _INDICES]
     values += (
         [np.clip(sheet.data[name].values.ravel(), -0.5, 1.5) for _, name, *_ in _INDICES]

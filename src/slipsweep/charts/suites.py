@@ -1,4 +1,4 @@
-"""Charts of a suite of recorded motions: a curve for each, with median and band; scatter; histogram; fragility."""
+"""Charts of a suite of recorded motions: curves with a band, scatter, histogram, fragility."""
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import replace
@@ -48,13 +48,16 @@ _BARS: Look = {"facecolor": "0.85", "edgecolor": "black", "linewidth": 1.0}
 
 
 def motions(result: Result, options: Options) -> Figure:
-    """Displacements over one axis: a thin line for each motion, median and 16 to 84 % band, and Newmark's median."""
+    """Draw displacements over one axis, a thin line for each motion.
+
+    Beside them are the median, the band from 16 to 84 %, and the median of Newmark's block.
+    """
     sheet = _sheet(result, options)
     sheet.show(DISPLACEMENT, "Not marked")
     if options.show_cautions:  # upslope ones lie below the axis, as zeros do
         sheet.data["drawn"] = sheet.data[DISPLACEMENT]
     for panel in sheet.panels:
-        floor = log_axis(panel.axes, _millimetres(sheet.data), _label(sheet), zeros=True)
+        floor = log_axis(panel.axes, _displacements(sheet.data), _label(sheet), zeros=True)
         lines = (
             panel.data["drawn"].transpose(*SUITE, panel.x, missing_dims="ignore").values * 1000.0
         )
@@ -73,10 +76,13 @@ def motions(result: Result, options: Options) -> Figure:
 
 
 def intensity(result: Result, options: Options) -> Figure:
-    """The displacement against a measure of each motion as it shakes the block, and the regression of ln u on it."""
+    """Draw the displacement against an intensity measure, and the regression of ln u on it.
+
+    The measure is that of each motion as it shakes the block.
+    """
     measures = [name for name in INTENSITY_MEASURES if f"motion_{name}" in result.data.coords]
     measure = options.x or ("arias_intensity" if "pgv" in result.dims else "pgv")
-    result.known(measure, measures, f"--x {measure}: no intensity measure")
+    result.checked(measure, measures, f"--x {measure}: no intensity measure")
     factor = [] if "scale" in result.data.coords else ["motion_factor"]
     sheet = _sheet(result, replace(options, x=None), "motion", factor)
     drawn = [_scattered(panel, measure) for panel in sheet.panels]
@@ -121,9 +127,9 @@ def intensity(result: Result, options: Options) -> Figure:
 
 
 def histogram(result: Result, options: Options) -> Figure:
-    """How many motions of a suite have which displacement, with the share of zeros."""
+    """Draw a histogram of the displacements of a suite, with the share of zeros."""
     sheet = _sheet(result, options, "motion")
-    everything = _millimetres(sheet.data)
+    everything = _displacements(sheet.data)
     slid = everything[everything > 0]
     if not slid.size:
         raise InputError(
@@ -134,7 +140,7 @@ def histogram(result: Result, options: Options) -> Figure:
     edges[0] = min(edges[0], slid.min())
     edges[-1] = max(edges[-1], slid.max())
     for panel in sheet.panels:
-        values = _millimetres(panel.data)
+        values = _displacements(panel.data)
         axes = panel.axes
         counts, _ = np.histogram(values[values > 0], edges)
         axes.bar(edges[:-1], counts, np.diff(edges), align="edge", gid="histogram", **_BARS)
@@ -158,7 +164,7 @@ def histogram(result: Result, options: Options) -> Figure:
 
 
 def fragility(result: Result, options: Options) -> Figure:
-    """The share of the motions of a suite that exceed a displacement, over one axis."""
+    """Draw the share of the motions of a suite that exceed a displacement, over one axis."""
     sheet = _sheet(result, options)
     found = suite_statistics(sheet.data, thresholds=options.heights or THRESHOLDS)
     _note_suite(sheet, "P is the share of")
@@ -172,7 +178,7 @@ def fragility(result: Result, options: Options) -> Figure:
 def _sheet(
     result: Result, options: Options, x: str | None = None, more: Sequence[str] = ()
 ) -> Sheet:
-    """A slice, along `x`, or along how strong the motions are, else Üy or ky, or any axis."""
+    """Return the sheet of a suite, over `x`, else over the strength of motions or block."""
     axes = [
         dim
         for dim in (*STRENGTHS, "yield_acceleration", "yield_coefficient", *result.wide)
@@ -215,13 +221,13 @@ def draw_suite(
 
 
 def suite_text(sizes: Mapping[Hashable, int]) -> str:
-    """How many motions there are: ``8 motions in 2 polarities``."""
+    """Return the number of motions in words: ``8 motions in 2 polarities``."""
     polarities = f" in {sizes['polarity']} polarities" if sizes.get("polarity", 1) > 1 else ""
     return f"{sizes['motion']} motions{polarities}"
 
 
 def _band(data: xr.Dataset, x: str) -> Floats:
-    """The suite's quantiles along an axis, mm."""
+    """Return the suite's quantiles along an axis, mm."""
     return (
         np.asarray(suite_statistics(data)["displacement_quantile"].transpose("quantile", x))
         * 1000.0
@@ -229,17 +235,21 @@ def _band(data: xr.Dataset, x: str) -> Floats:
 
 
 def _label(sheet: Sheet) -> str:
-    """Label of an axis of displacements."""
+    """Return the label of an axis of displacements."""
     return f"{style.displacement_text(sheet.data.attrs)} (mm)"
 
 
-def _millimetres(data: xr.Dataset) -> Floats:
+def _displacements(data: xr.Dataset) -> Floats:
+    """Return all displacements that have a value, mm."""
     values = data[DISPLACEMENT].values.ravel() * 1000.0
     return np.asarray(values[np.isfinite(values)], np.float64)
 
 
 def _scattered(panel: Panel, measure: str) -> Floats:
-    """Intensity as it shakes the block, displacement in mm, and polarity, in rows, of all that are drawn."""
+    """Return rows of intensity, displacement (mm) and polarity of all motions that are drawn.
+
+    The intensity is that of the motion as it shakes the block.
+    """
     data = panel.data
     power, time_power = SCALING[measure]
     factor = np.abs(data["scale"] if "scale" in data.coords else data["motion_factor"])
@@ -251,14 +261,14 @@ def _scattered(panel: Panel, measure: str) -> Floats:
 
 
 def _sliding_left_out(sheet: Sheet) -> int:
-    """Number of motions of all panels that slide and are not drawn, as their displacements are unreliable."""
+    """Return the number of motions that slide and are not drawn, as they are unreliable."""
     moved = sheet.data[DISPLACEMENT]
     drawn = reliable(sheet.data, DISPLACEMENT, sheet.options.show_cautions)
     return int((moved.notnull() & (moved != 0.0) & drawn.isnull()).sum())
 
 
 def _draw_regression(sheet: Sheet, panel: Panel, xs: Floats, ys: Floats) -> None:
-    """The line of ln u = a + b ln(measure), its R² and scatter over the panel."""
+    """Draw the line ln u = a + b ln(measure), with R² and scatter above the panel."""
     slid = (ys > 0) & (xs > 0) & np.isfinite(xs)
     if slid.sum() < 3:
         panel.add_title("no regression: fewer than 3 motions slide")
@@ -275,7 +285,7 @@ def _draw_regression(sheet: Sheet, panel: Panel, xs: Floats, ys: Floats) -> None
 
 
 def _note_suite(sheet: Sheet, what: str, zeros_are: str = "") -> None:
-    """How many motions there are, how many of them have no value, and why; how many displacements are zero."""
+    """Add to the caption the numbers of motions, of those without a value, and of zeros."""
     found = suite_statistics(sheet.data)
     missing = found["valueless_count"]
     reasons = found["valueless_flag_count"]
@@ -298,7 +308,7 @@ def _note_suite(sheet: Sheet, what: str, zeros_are: str = "") -> None:
 
 
 def _note_cautions(sheet: Sheet) -> None:
-    """Which cautions the statistics have in them."""
+    """Add to the caption the cautions on values in the statistics."""
     shares = {flag: float(has_flags(sheet.data["validity"], flag).mean()) for flag in CAUTIONS}
     seen = {flag: percent(share) for flag, share in shares.items() if share}
     if seen:

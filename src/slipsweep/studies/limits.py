@@ -34,8 +34,8 @@ from slipsweep.studies.datasets import Values
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-#: Cells, and intervals of amplitude in which they reach their targets: not at the lower end, but at
-#: the upper one.
+#: Cells, and intervals of amplitude: at the upper end a cell reaches its target, at the lower it
+#: does not.
 Steps = tuple[Indices, Floats, Floats]
 
 TITLE = "Amplitudes at which a tolerable displacement is reached"
@@ -120,12 +120,13 @@ def limit_amplitude(
         Dimensions theta, mu_s, frequency, then others, displacement last:
 
         - `limit_amplitude`, m/s²; NaN where there is none.
-        - `limit_status`: 0 reached, 1 at_mode_jump, 2 at_jump (u rises by more than 1e-6 of itself between neighbouring
-          numbers, with and without a change of sliding mode), 3 after_gap (no value just below), 4
-          not_reached, 5 invalid (no value anywhere).
-        - `permanent_displacement`, m, and `sliding_mode` (under a record the counts of slips and pulses) at the
-          limit; more than `displacement` where a discontinuity of the model sets the limit.  Of a
-          block that slides both ways also `largest_displacement` and `smallest_displacement`.
+        - `limit_status`: 0 reached, 1 at_mode_jump, 2 at_jump (u rises by more than 1e-6 of itself
+          between neighbouring numbers, with and without a change of sliding mode), 3 after_gap (no
+          value just below), 4 not_reached, 5 invalid (no value anywhere).
+        - `permanent_displacement`, m, and `sliding_mode` (under a record the counts of slips and
+          pulses) at the limit; more than `displacement` where a discontinuity of the model sets the
+          limit.  Of a block that slides both ways also `largest_displacement` and
+          `smallest_displacement`.
         - `validity` at the limit or, where there is none, at `maximum_amplitude`.
 
     Raises
@@ -188,7 +189,10 @@ def plan_limits(
     maximum_amplitude: float | None = None,
     amplitude_steps: int = AMPLITUDE_STEPS,
 ) -> Plan:
-    """Plan of `limit_amplitude`, as which parameters and errors are; `inputs` have no strength of the shaking."""
+    """Return the plan of `limit_amplitude`; same parameters and errors.
+
+    `inputs` have no strength of the shaking.
+    """
 
     target = check_displacement(displacement)
     dims = target.dims
@@ -208,7 +212,7 @@ def plan_limits(
     solved["displacement"] = solved.pop("amplitude")
     blocks = grid_sizes({name: one for name, one in solved.items() if name not in _AFTER_SCAN})
     scaled = {dim: size for dim, size in plan.sizes.items() if dim not in blocks}
-    # in which mode a block slides, or in how many pulses of a record
+    # the sliding mode, or under a record the numbers of pulses
     codes = variables.RECORD_COUNTS if "time_scale" in solved else ("sliding_mode",)
     extremes = variables.EXTREMES if options.slides_both_ways(request.problem.model) else ()
     names = (*variables.LIMIT_RESULTS, *extremes, *codes, "validity")
@@ -259,7 +263,10 @@ def check_displacement(displacement: Any) -> xr.Variable:
 
 
 def _solve(maximum_amplitude: float, steps: int, request: Request) -> Variables:
-    """Limit amplitudes of a grid, whose inputs have the `displacement` to be reached in place of the amplitude."""
+    """Return the limit amplitudes of a grid.
+
+    Its inputs have the `displacement` to be reached in place of the amplitude.
+    """
     results = request.results()
     for where, motion in engine.motions(request):
         # two thresholds of a pulse, and two sides of each, in addition to the steps
@@ -273,7 +280,7 @@ def _solve(maximum_amplitude: float, steps: int, request: Request) -> Variables:
 
 
 def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> dict[str, NDArray[Any]]:
-    """Limit amplitudes of a part of a grid that one motion shakes."""
+    """Return the limit amplitudes of a part of a grid that one motion shakes."""
     scan = Scan(request, maximum_amplitude, steps)
     cell, low, high = _limits(scan)
     wanted = tuple(name for name in request.wanted if not name.startswith("limit_"))
@@ -306,7 +313,7 @@ def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> dict[
 
 
 class Scan:
-    """Cells that one motion shakes, at increasing amplitudes: those of a part of a grid."""
+    """Displacements of the cells of a part of a grid, under one motion of increasing amplitude."""
 
     def __init__(self, request: Request, maximum_amplitude: float, steps: int) -> None:
         self.problem = request.problem
@@ -342,7 +349,7 @@ class Scan:
     def solve(
         self, amplitude: Floats, cell: Indices, wanted: tuple[str, ...]
     ) -> dict[str, NDArray[Any]]:
-        """Results of some cells, each at its own amplitudes (rows of the array)."""
+        """Return results of some cells, each at its own amplitudes (a row of the array)."""
         dims = ("cell", _ALONG)[: amplitude.ndim]
         inputs = {name: one[cell] if one.dims else one for name, one in self.inputs.items()}
         inputs["amplitude"] = xr.Variable(dims, amplitude)
@@ -358,10 +365,10 @@ class Scan:
 
 
 def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) -> xr.Variable:
-    """Amplitudes to try, with both sides of every change of mode: along a dimension of their own, the last one.
+    """Return the amplitudes of the scan, with both sides of every change of mode.
 
-    The other dimensions are those of the grid along which more than the target and the time scale
-    varies.
+    They lie along the last dimension.  The other dimensions are those of the grid along which more
+    than the target and the time scale varies.
     """
     problem = request.problem
     blocks = {name: one for name, one in request.inputs.items() if name not in _AFTER_SCAN}
@@ -402,7 +409,10 @@ def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) 
 
 
 def _heights(request: Request) -> Floats:
-    """Heights of the 128 highest pulses (noise has thousands), in parts of the motion's amplitude, increasing."""
+    """Return the heights of the 128 highest pulses, in parts of the motion's amplitude.
+
+    They increase.  A record with noise has thousands of pulses.
+    """
     motion = request.problem.excitation
     if not isinstance(motion, Record):
         return np.ones(1)
@@ -413,7 +423,10 @@ def _heights(request: Request) -> Floats:
 
 
 def _limits(scan: Scan) -> Steps:
-    """The lowest neighbouring amplitudes between which cells reach their targets, of those cells that do."""
+    """Return the cells that reach their targets, and neighbouring amplitudes between which they do.
+
+    They are the lowest such amplitudes.
+    """
     reaches = scan.displacements >= scan.targets[:, np.newaxis]
     reached = np.logical_or.accumulate(reaches, axis=1)
     # the scan begins at yield, where no block has moved: there is always a step before
@@ -423,8 +436,7 @@ def _limits(scan: Scan) -> Steps:
         (cell, scan.amplitudes[cell, step], scan.amplitudes[cell, step + 1]),
         *_hidden_peaks(scan, before),
     ]
-    # in the gap of the literal rise Kd would be negative: at its edges Kd vanishes, and u grows
-    # beyond all bounds
+    # the literal rise has a gap where Kd is negative: at its edges Kd is 0, and u infinite
     found.append(_at_change(scan, before, "validity", bits=Validity.KD_NOT_POSITIVE.value))
     if (
         "number_of_slips" in scan.found
@@ -440,7 +452,10 @@ def _limits(scan: Scan) -> Steps:
 
 
 def _hidden_peaks(scan: Scan, before: NDArray[np.bool_]) -> Iterator[Steps]:
-    """Parts of steps in which a target is reached, `before` (cell, step) the scan itself reaches it."""
+    """Yield parts of steps in which a target is reached beside a peak between two amplitudes.
+
+    `before`, (cell, step), is True as long as the scan itself has not reached the target.
+    """
     # blocks that do not recouple: u jumps up each time that they come to rest one pulse earlier,
     # and then falls
     saw, parts = (0.7, 128) if isinstance(scan.problem.excitation, Record) else (0.5, 512)
@@ -474,31 +489,33 @@ def _at_change(
     least: float = 0.0,
     part: float = 0.0,
 ) -> Steps:
-    """Steps up to the last amplitude before a change of a result, or to the first after it, that reaches a target.
+    """Return steps that reach a target at a change of a result, just before it or just after it.
 
-    The place of the change is located, to a `part` of the step, where u on either side of it is
-    `least` of the target.
+    The place of the change is located to a `part` of the step, if u on one side of it is at least
+    the part `least` of the target.
     """
     moved = scan.displacements
     states = scan.found[result] & bits
     cell, step = np.nonzero(states[:, 1:] != states[:, :-1])
     higher = np.maximum(moved[cell, step + 1], moved[cell, step])
-    # no comparison holds for the NaN of a gap: its edges are located
+    # a gap is NaN, and no comparison with NaN is true: its edges are located, too
     may = before[cell, step] & ~(higher < least * scan.targets[cell])
     cell = cell[may]
     step = step[may]
     start = scan.amplitudes[cell, step]
     end = scan.amplitudes[cell, step + 1]
-    known = states[cell, step]
+    state_before = states[cell, step]
 
     def changed(amplitude: Floats, which: Indices) -> NDArray[np.bool_]:
         there = scan.solve(amplitude, cell[which], (result,))[result] & bits
-        return np.asarray(there != known[which])
+        return np.asarray(there != state_before[which])
 
     low, high = _bisected(start, end, changed, part * (end - start))
     at_low = scan.reach(low, cell)
-    found = at_low | scan.reach(high, cell)
-    return cell[found], np.where(at_low, start, low)[found], np.where(at_low, low, high)[found]
+    reaches = at_low | scan.reach(high, cell)
+    lower = np.where(at_low, start, low)
+    upper = np.where(at_low, low, high)
+    return cell[reaches], lower[reaches], upper[reaches]
 
 
 def _bisected(
@@ -507,9 +524,10 @@ def _bisected(
     changed: Callable[[Floats, Indices], NDArray[np.bool_]],
     width: Floats | float = 0.0,
 ) -> tuple[Floats, Floats]:
-    """Halve intervals until their ends are neighbours in double precision, or no further apart than `width`.
+    """Halve intervals until their ends are neighbours in double precision, or `width` apart.
 
-    `changed`, of amplitudes and the indices of their intervals, holds at `high` and not at `low`.
+    `changed` takes amplitudes and the indices of their intervals; it is True at `high`, not at
+    `low`.
     """
     low = low.copy()
     high = high.copy()

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 TITLE = "Published equations for the permanent displacement of a rigid block"
 
-#: Statistics that an equation has, as a suite has them.
+#: Statistics of a suite that an equation has, too.
 _STATISTICS = (
     "zero_probability",
     "nonzero_median",
@@ -158,7 +158,10 @@ def published_statistics(
 def estimates(
     result: xr.Dataset, names: Sequence[str], magnitude: float | None = None
 ) -> dict[str, Estimate]:
-    """Estimates by equations at the points of a result: DataArrays along the inputs' dimensions."""
+    """Return estimates by equations at the points of a result.
+
+    They are DataArrays along the dimensions of the inputs.
+    """
     found = {}
     for name in names:
         equation = EQUATIONS[name]
@@ -184,7 +187,7 @@ def estimates(
 
 
 def conditions_texts(names: Sequence[str]) -> list[str]:
-    """Sentences: that equations are for other conditions than one's block, and for which."""
+    """Return sentences on the conditions that the equations are for."""
     texts = ["Published equations are for other conditions: Newmark's rigid block, other shaking."]
     for name in names:
         equation = EQUATIONS[name]
@@ -199,7 +202,9 @@ def published_table(
     magnitude: float | None = None,
     thresholds: Thresholds | None = None,
 ) -> "pd.DataFrame":
-    """Displacements in rows: at each grid point of the result's own suite and of each equation.
+    """Return displacements in rows, of the result's own suite and of each equation.
+
+    There is a row for each grid point.
 
     Columns: the axes, ``displacement of``, the quantiles (mm), the probability of zero and of
     exceeding `thresholds`, and ``range``, which is "outside" where an equation is extrapolated.
@@ -215,7 +220,7 @@ def published_table(
         sources = {"this suite": own.assign(in_range=xr.ones_like(own["value_count"]))} | sources
     parts = [_columns(one, bool(limits)) for one in sources.values()]
     whole = xr.concat(parts, pd.Index([*sources], name="displacement of"))
-    # in the order of the result; axes of one value are said elsewhere
+    # in the order of the result, without axes of one value
     axes = [str(dim) for dim in result.dims if whole.sizes.get(dim, 1) > 1]
     single = [dim for dim in whole.dims if dim not in (*axes, "displacement of")]
     laid = whole.squeeze(single, drop=True).assign_coords(
@@ -227,7 +232,7 @@ def published_table(
 
 
 def _columns(found: xr.Dataset, exceeded: bool) -> xr.Dataset:
-    """Quantiles in mm and probabilities of statistics, by the titles of a table."""
+    """Return quantiles in mm and probabilities by the titles of a table."""
     columns: dict[str, xr.DataArray] = {}
     for share in found["quantile"].values:
         title = "median (mm)" if share == 0.5 else f"{100.0 * share:.3g} % (mm)"
@@ -248,7 +253,7 @@ def published_lines(
     thresholds: Thresholds | None = None,
     most: int = 100,
 ) -> list[str]:
-    """The table of `published_table` in lines, and what the equations are for."""
+    """Return the table of `published_table` in lines, and the conditions of the equations."""
     names = check_equations(equations)
     found = published_statistics(result, names, magnitude=magnitude)
     points = found["in_range"].isel(equation=0).size
@@ -278,7 +283,7 @@ def _number(value: float, as_text: str) -> str:
 
 
 def axis_labels_of(result: xr.Dataset, dim: str) -> list[Any]:
-    """Places along an axis: numbers, peak ground accelerations in g, or labels."""
+    """Return places along an axis: numbers, peak ground accelerations in g, or labels."""
     if dim in result.variables and result[dim].dtype.kind in "iuf":
         factor = float(result.attrs["g"]) if dim == "amplitude" else 1.0
         return [float(one) / factor for one in result[dim].values]
@@ -286,14 +291,14 @@ def axis_labels_of(result: xr.Dataset, dim: str) -> list[Any]:
 
 
 def axis_title(result: xr.Dataset, dim: str) -> str:
-    """The title of an axis: its name and unit."""
+    """Return the title of an axis: its name and unit."""
     names = {"amplitude": "PGA (g)", "yield_coefficient": "ky"}
     units = result[dim].attrs.get("units", "1") if dim in result.variables else "1"
     return names.get(dim, dim if units == "1" else f"{dim} ({units})")
 
 
 def _with(estimate: Estimate, method: Callable[[Any], Any], more: xr.DataArray) -> xr.DataArray:
-    """A method of an estimate at several values, along their own dimension."""
+    """Return a method of an estimate at several values, along their own dimension."""
     values = np.stack([method(float(one)) for one in more.values], axis=-1)
     return xr.DataArray(values, dims=(*estimate.median.dims, *more.dims))
 
@@ -308,17 +313,17 @@ def _magnitude(magnitude: Any) -> xr.DataArray:
     return xr.DataArray(values)
 
 
-# ------------------------------------------------------- what equations take from a result
+# ------------------------------------------------------- inputs of equations from a result
 
 
 def _input(result: xr.Dataset, name: str) -> xr.DataArray | None:
-    """An input of equations at the points of a result, without coordinates; None if not there."""
+    """Return an input of equations at the points of a result, or None; it has no coordinates."""
     array = _FROM_RESULT[name](result) if name in _FROM_RESULT else None
     return None if array is None else array.astype(np.float64).drop_vars([*array.coords])
 
 
 def _yield_coefficient(result: xr.Dataset) -> xr.DataArray | None:
-    """Üy/g, NaN where the block slides under its own weight."""
+    """Return Üy/g, NaN where the block slides under its own weight."""
     g = float(result.attrs["g"])
     if "yield_coefficient" in result.coords:
         found = result["yield_coefficient"]
@@ -337,7 +342,7 @@ def _yield_coefficient(result: xr.Dataset) -> xr.DataArray | None:
 
 
 def peak_acceleration_in_g(result: xr.Dataset) -> xr.DataArray | None:
-    """Peak ground acceleration in g; of motions that are scaled otherwise their median."""
+    """Return the peak ground acceleration in g; of motions with a `scale` their median."""
     g = float(result.attrs["g"])
     if "amplitude" in result.coords:
         return _shaken(result["amplitude"] / g)
@@ -348,7 +353,7 @@ def peak_acceleration_in_g(result: xr.Dataset) -> xr.DataArray | None:
 
 
 def _pgv(result: xr.Dataset) -> xr.DataArray | None:
-    """Peak ground velocity, m/s: of the scaling, the median of the motions, or of a waveform."""
+    """Return the peak ground velocity, m/s: that of the scaling, the motions or the waveform."""
     if "pgv" in result.coords:
         return _above_zero(result["pgv"])
     if "motion_pgv" in result.coords:
@@ -363,7 +368,7 @@ def _pgv(result: xr.Dataset) -> xr.DataArray | None:
 
 
 def _of_motions(result: xr.Dataset, measure: str, unit: Any) -> xr.DataArray | None:
-    """Median of a measure of the motions as they shake the block; None without their factors."""
+    """Return the median measure of the motions as they shake the block, or None."""
     if measure not in result.coords:
         return None
     if "scale" in result.coords:
@@ -379,26 +384,26 @@ def _of_motions(result: xr.Dataset, measure: str, unit: Any) -> xr.DataArray | N
 
 
 def _period(result: xr.Dataset) -> xr.DataArray | None:
-    """Period of a waveform whose cycles are equal, s."""
+    """Return the period of a waveform whose cycles are equal, s, or None."""
     is_plain = not (result.attrs.get("ramp_in") or result.attrs.get("ramp_out"))
     return 1.0 / result["frequency"] if "frequency" in result.coords and is_plain else None
 
 
 def _cycles(result: xr.Dataset) -> xr.DataArray | None:
-    """Number of equal cycles of a waveform."""
+    """Return the number of equal cycles of a waveform, or None."""
     if _period(result) is None or "cycles" not in result.attrs:
         return None
     return xr.DataArray(float(result.attrs["cycles"]))
 
 
 def _pulse_duration(result: xr.Dataset) -> xr.DataArray | None:
-    """Half a period of a waveform, s."""
+    """Return half a period of a waveform, s, or None."""
     period = _period(result)
     return None if period is None else 0.5 * period
 
 
 def _shaken(pga: xr.DataArray) -> xr.DataArray:
-    """Peak ground accelerations; in place of 0, by which equations divide, 1e-12 g."""
+    """Return peak ground accelerations, with 1e-12 g for 0, by which equations divide."""
     return pga.where(pga > 0.0, 1e-12)
 
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 TITLE = "Yield coefficient that published equations require for a tolerable displacement"
 
-#: ky/PGA of the scan, through ln(r/(1 − r)), and how often the step that holds the crossing is cut
+#: ky/PGA of the scan, in equal steps of ln(r/(1 − r)); times that the step with the crossing is cut
 #: into as many parts.
 _RATIOS = 1.0 / (1.0 + np.exp(-np.linspace(-9.0, 14.0, 512)))
 _NARROWINGS = 6
@@ -133,7 +133,7 @@ def strength_by(
 ) -> tuple[xr.DataArray, xr.DataArray]:
     """Return ky at which an equation's quantile is the displacement, and if it is in range.
 
-    The largest such ky, if there are several: above it the quantile stays within.
+    If there are several such ky, it is the largest: above it the quantile stays within.
     """
     pga = peak_acceleration_in_g(strengths)
     if pga is None:
@@ -204,7 +204,7 @@ def strength_table(
 def strength_lines(
     strengths: xr.Dataset, equations: Sequence[str], magnitude: float | None = None
 ) -> list[str]:
-    """Return the table of `strength_table` in lines, and what the equations are for."""
+    """Return the table of `strength_table` in lines, and the conditions of the equations."""
     table = strength_table(strengths, equations, magnitude)
     outside = ["outside: an input lies outside of the range of the equation"]
     if not table["range"].any():

@@ -27,7 +27,7 @@ TITLE = "Strength that is required for a tolerable displacement"
 #: Inputs that are the strength of the interface, of which one is solved for.
 _STRENGTHS = (*variables.REQUIRED_STRENGTHS, "yield_acceleration")
 
-#: A strength that every model takes, where the required one will stand.
+#: A strength that every model allows, in place of the required one.
 _ANY = 0.5
 
 #: Evaluations of the kernel for each required strength, about.
@@ -217,7 +217,7 @@ def plan_strength(
     if "displacement_amplitude" in plan.coords and (
         {"displacement_amplitude", "frequency"} & {*absolute}
     ):
-        dropped.add("amplitude")  # A = ω²d of no value is nobody's amplitude
+        dropped.add("amplitude")  # without values of d and f there is no A = ω²d
     coords = {name: one for name, one in plan.coords.items() if name not in dropped}
     source = plan.attrs["friction_inputs"].partition(";")[2]
     attrs = {
@@ -236,7 +236,7 @@ def plan_strength(
 
 
 class StrengthPlan(plans.Plan):
-    """Required strengths of a grid, each motion's along `pooled` dimensions, and quantiles."""
+    """Required strengths of a grid, with those of each motion along `pooled` dimensions."""
 
     def __init__(
         self,
@@ -399,11 +399,11 @@ def friction_of(yield_coefficient: Floats, theta: Floats, of: str) -> Floats:
 
 
 def quantiles_of(strengths: Floats, never: np.ndarray, shares: Floats) -> Floats:
-    """Return quantiles along the last axis, in which those `never` within are above all others.
+    """Return quantiles along the last axis; strengths of cells `never` within are infinite.
 
     A quantile that lies among them, or between them and the largest of the others, is infinite.
     """
-    # so large that whatever is interpolated towards it is above all others
+    # so large that a value interpolated towards it is above all others
     beyond = np.finfo(np.float64).max / 4.0
     filled = np.where(never, beyond, strengths)
     found = np.moveaxis(np.quantile(filled, shares, axis=-1), 0, -1)

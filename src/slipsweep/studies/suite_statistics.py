@@ -66,13 +66,16 @@ def suite_statistics(
     Dataset
         Over all other dimensions:
 
-        - `value_count`, `valueless_count`: motions with a value, and without; `valueless_share` of all.
-        - `valueless_flag_count`, dimension `flag`: motions without a value, by reason.  One may have several.
+        - `value_count`, `valueless_count`: motions with a value, and without; `valueless_share` of
+          all.
+        - `valueless_flag_count`, dimension `flag`: motions without a value, by reason.  One may
+          have several.
         - `zero_probability`: share of displacements of `zero` at most.
-        - `nonzero_median`, `nonzero_geometric_mean` (m) and `log_standard_deviation` (of natural logarithms, with
-          n - 1) of the others, which are described apart as by Bray and Travasarou [1]_.
-        - `displacement_quantile` (m), dimension `quantile`, and `exceedance_probability`, dimension `threshold` (m):
-          of all displacements, those that are zero, too.
+        - `nonzero_median`, `nonzero_geometric_mean` (m) and `log_standard_deviation` (of natural
+          logarithms, with n - 1) of the others, which are described apart as by Bray and
+          Travasarou [1]_.
+        - `displacement_quantile` (m), dimension `quantile`, and `exceedance_probability`, dimension
+          `threshold` (m): of all displacements, those that are zero, too.
 
         All but the counts and `valueless_share` are of the motions that have a value, NaN where
         none has.  Of a block that slides both ways they are of ``|u|``.
@@ -90,8 +93,9 @@ def suite_statistics(
 
     References
     ----------
-    .. [1] J. D. Bray and T. Travasarou (2007), "Simplified procedure for estimating earthquake-induced deviatoric slope
-       displacements", Journal of Geotechnical and Geoenvironmental Engineering 133, 381-392,
+    .. [1] J. D. Bray and T. Travasarou (2007), "Simplified procedure for estimating
+       earthquake-induced deviatoric slope displacements", Journal of Geotechnical and
+       Geoenvironmental Engineering 133, 381-392,
        https://doi.org/10.1061/(ASCE)1090-0241(2007)133:4(381)
 
     Examples
@@ -119,7 +123,7 @@ def suite_statistics(
     moved = without_rounding(result["permanent_displacement"].astype(np.float64).load())
     if has_signed_displacements(result.attrs):
         moved = abs(moved)
-    # a reader may have made codes to numbers with NaN
+    # a reader may have turned codes into floating-point numbers with NaN
     codes = result["validity"].fillna(0).astype(np.int16).load()
     there = moved.notnull()
     total = int(np.prod([moved.sizes[dim] for dim in dims]))
@@ -165,25 +169,32 @@ def suite_statistics(
 
 
 def without_rounding(displacements: xr.DataArray) -> xr.DataArray:
-    """Displacements, m, those that are the rounding of zero as zero: a block at yield moves 1e-48."""
+    """Return displacements, m, with those below 1e-12 m as zero: a block at yield moves 1e-48."""
     return displacements.where(~(abs(displacements) < 1e-12), 0.0)
 
 
 def _quantiles(values: xr.DataArray, quantiles: np.ndarray, dims: Sequence[str]) -> xr.DataArray:
-    """Quantiles of the values that are there, linear between them; dimension `quantile`, without a coordinate."""
+    """Return quantiles of the values that are not NaN, linear between them.
+
+    The dimension `quantile` has no coordinate.
+    """
     there = values.notnull().any(dims)
-    full = values.where(there, 0.0)  # of nothing there is no quantile
+    full = values.where(there, 0.0)  # without any value there is no quantile
     # to leave out NaN takes ten times as long
     found = full.quantile(quantiles, dims, skipna=bool(full.isnull().any()))
     return found.where(there).drop_vars("quantile").transpose(..., "quantile")
 
 
 def suite_dims(values: xr.DataArray, over: Any = None) -> tuple[str, ...]:
-    """The dimensions that make up the suite: those in `over`, or `SUITE`; InputError: `motion` is not among them."""
+    """Return the dimensions that make up the suite: those in `over`, or `SUITE`.
+
+    InputError: `motion` is not among them.
+    """
     there = tuple(map(str, values.dims))
     if "motion" not in there:
         raise InputError(
-            f"result: dimensions {', '.join(there) or 'none'}: must have motion, or be of [uncertainty]"
+            f"result: dimensions {', '.join(there) or 'none'}: must have motion, or be of "
+            "[uncertainty]"
         )
     if over is None:
         return tuple(dim for dim in SUITE if dim in there)
@@ -201,11 +212,11 @@ def suite_dims(values: xr.DataArray, over: Any = None) -> tuple[str, ...]:
 
 
 def limit_quantiles(limits: xr.Dataset) -> xr.Dataset:
-    """`QUANTILES` of the limit amplitudes of a suite's motions, at every other grid point: `limit_amplitude`'s result.
+    """Return `QUANTILES` of the limit amplitudes of a suite's motions, at every other grid point.
 
-    A motion that does not reach the displacement has a limit above all others, and is of
-    `not_reached_count`: a `limit_quantile` (m/s²) is infinite where too many do not.  Those without
-    a value are left out of it.
+    `limits` is a result of `limit_amplitude`.  A motion that does not reach the displacement has a
+    limit above all others and is counted in `not_reached_count`: a `limit_quantile` (m/s²) is
+    infinite where too many do not.  Motions without a value are left out.
     """
     dims = suite_dims(limits["limit_amplitude"])
     beyond = limits["limit_status"] == LimitStatus.NOT_REACHED
@@ -222,11 +233,11 @@ def limit_quantiles(limits: xr.Dataset) -> xr.Dataset:
 
 
 def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100) -> list[str]:
-    """What a designer asks first of a suite, a line for each grid point: median, 16 and 84 %, share of zeros, P(u > d).
+    """Return a line for each grid point: median, 16 and 84 %, share of zeros, P(u > d).
 
-    `result` is one of `sweep` with the dimension `motion`, or of `sample`, whose lines are without
-    the share of zeros, and displacements d among its thresholds.  Of more grid points than `most`
-    there is one line: how to have some.
+    `result` is one of `sweep` with the dimension `motion`, or of `sample`.  Lines of `sample` have
+    no share of zeros, and d must be among its thresholds.  For more grid points than `most` there
+    is one line, which says how to cut the grid.
     """
     import pandas as pd
 
@@ -235,9 +246,8 @@ def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100)
     dims = ("quantile",) if is_sampled else suite_dims(moved)
     grid = {dim: size for dim, size in moved.sizes.items() if dim not in dims}
     points = math.prod(grid.values())
-    drawn = f"{result.attrs.get('pooled', '')} x {result.attrs.get('samples', '')} samples".removeprefix(
-        " x "
-    )
+    pooled = result.attrs.get("pooled", "")
+    drawn = f"{pooled} x {result.attrs.get('samples', '')} samples".removeprefix(" x ")
     suite = drawn if is_sampled else grid_text({dim: moved.sizes[dim] for dim in dims})
     if points > most:
         how = "slipsweep info OUT.nc --at NAME=VALUE -d 50mm"
@@ -288,7 +298,7 @@ def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100)
 
 
 def at_thresholds(found: xr.Dataset, thresholds: Thresholds | None) -> xr.Dataset:
-    """What `sample` has stored, at some of its thresholds (InputError: not among them), or at all."""
+    """Return statistics of `sample` at some of its thresholds (InputError: not among them)."""
     if thresholds is None:
         return found
     wanted = check_thresholds("thresholds", thresholds, float(found.attrs.get("g", np.nan)))
@@ -303,7 +313,7 @@ def at_thresholds(found: xr.Dataset, thresholds: Thresholds | None) -> xr.Datase
 
 
 def labels_along(data: xr.Dataset, dim: Hashable, factor: float = 1.0) -> list[str]:
-    """What the places along a dimension are called: its labels, its numbers times a factor, or 1, 2, ..."""
+    """Return the names of places along a dimension: labels, numbers times a factor, or 1, 2, …"""
     name = next(
         (one for one in (dim, "label") if one in data.variables and data[one].dims == (dim,)), None
     )
@@ -314,7 +324,7 @@ def labels_along(data: xr.Dataset, dim: Hashable, factor: float = 1.0) -> list[s
 def point_names(
     data: xr.Dataset, sizes: Mapping[Any, int], factors: Mapping[Any, float] | None = None
 ) -> list[str]:
-    """Names of the points of a grid: ``theta = 5, mu_s = 0.3``; numbers times `factors`."""
+    """Return the names of grid points: ``theta = 5, mu_s = 0.3``; numbers are times `factors`."""
     along = (
         [f"{dim} = {label}" for label in labels_along(data, dim, (factors or {}).get(dim, 1.0))]
         for dim in sizes

@@ -1,4 +1,4 @@
-"""Uncertain inputs: samples of a sweep's parameters, and the statistics of the displacement at every grid point.
+"""`sample`: statistics of the displacement at every grid point under uncertain inputs.
 
 Parameters are drawn once (`sampling`), and the same draws serve every grid point: curves over an
 axis are then as smooth as the model, and differences between grid points are not blurred by
@@ -43,13 +43,12 @@ SENSITIVITY: dict[str, tuple[str, ...]] = {
     "sensitivity_status": (),
 }
 
-#: Those that depend on the frequency even where the samples do not.
+#: Statistics that depend on the frequency even where the samples do not.
 _BY_FREQUENCY = ("displacement_quantile", "mean_displacement", "exceedance_probability")
 
 _MODES = tuple(mode for mode in variables.SlidingMode if mode is not variables.SlidingMode.MISSING)
 
-#: Parameters that have an estimate where they are not given, in the order in which each needs those
-#: before it.
+#: Parameters that have an estimate where they are not given.  Each may need those before it.
 _ESTIMATED = ("yield_acceleration", "minimum_friction", "delta_mu", "decay_rate")
 
 #: Names that no dimension and no coordinate of a caller's may have.
@@ -115,9 +114,9 @@ def sample(
 
         - ``distribution``: the name of a continuous distribution of scipy.stats (or a frozen one),
           whose shape parameters, ``loc`` and ``scale`` are further keys;
-        - ``kind``: "absolute" (a draw is the value; by default), "factor" (it multiplies the value at the grid point
-          or, for `yield_acceleration`, and without a record for `decay_rate`, `delta_mu` and
-          `minimum_friction`, the estimate) or "offset" (it is added to it);
+        - ``kind``: "absolute" (a draw is the value; by default), "factor" (it multiplies the value
+          at the grid point or, for `yield_acceleration`, and without a record for `decay_rate`,
+          `delta_mu` and `minimum_friction`, the estimate) or "offset" (it is added to it);
         - ``units``: of the draws, if not the parameter's own; not with factors.
     samples : int
         Samples a grid point; a power of 2 for Sobol's.
@@ -146,21 +145,21 @@ def sample(
     Dataset
         Over the grid:
 
-        - `displacement_quantile` (m), dimension `quantile`, `mean_displacement` (m) and `exceedance_probability`,
-          dimension `threshold` (m): P(u > threshold).  They are of the samples that have a value;
-          NaN where none has. Statically unstable samples, and those that do not come to rest after
-          the shaking, have no value, and are counted as exceeding every threshold.  Of a block that
-          slides both ways they are of ``|u|``.
-        - `mode_share` (not under a record), dimension `mode`, `flag_share`, dimension `flag`, and `valueless_share`: of
-          all samples, how many slide in which mode, have which flag, and have no value.  They do
-          not depend on the frequency (of a record: the time scale) and have no such dimension (but
-          with `displacement_amplitude`).
-        - with `sensitivity`, `first_order_index` and `total_index`, dimension `input`: the part of the variance of the
-          displacement that an input makes by itself, and with all that depends on it; their 95 %
-          intervals by a bootstrap, `first_order_interval` and `total_interval`, dimension `bound`.
-          They lack the frequency as shares do.  Inputs that are correlated count as one, named as
-          in "decay_rate+delta_mu".  There are none (NaN) where `sensitivity_status` is 1 (all runs
-          have the same displacement) or 2 (a run has no value).
+        - `displacement_quantile` (m), dimension `quantile`, `mean_displacement` (m) and
+          `exceedance_probability`, dimension `threshold` (m): P(u > threshold).  They are of the
+          samples that have a value; NaN where none has. Statically unstable samples, and those that
+          do not come to rest after the shaking, have no value, and are counted as exceeding every
+          threshold.  Of a block that slides both ways they are of ``|u|``.
+        - `mode_share` (not under a record), dimension `mode`, `flag_share`, dimension `flag`, and
+          `valueless_share`: of all samples, how many slide in which mode, have which flag, and have
+          no value.  They do not depend on the frequency (of a record: the time scale) and have no
+          such dimension (but with `displacement_amplitude`).
+        - with `sensitivity`, `first_order_index` and `total_index`, dimension `input`: the part of
+          the variance of the displacement that an input makes by itself, and with all that depends
+          on it; their 95 % intervals by a bootstrap, `first_order_interval` and `total_interval`,
+          dimension `bound`.  They lack the frequency as shares do.  Inputs that are correlated
+          count as one, named as in "decay_rate+delta_mu".  There are none (NaN) where
+          `sensitivity_status` is 1 (all runs have the same displacement) or 2 (a run has no value).
 
     Raises
     ------
@@ -174,8 +173,8 @@ def sample(
 
     References
     ----------
-    .. [1] A. Saltelli et al. (2010), "Variance based sensitivity analysis of model output", Computer Physics
-       Communications 181, 259-270, https://doi.org/10.1016/j.cpc.2009.09.018
+    .. [1] A. Saltelli et al. (2010), "Variance based sensitivity analysis of model output",
+       Computer Physics Communications 181, 259-270, https://doi.org/10.1016/j.cpc.2009.09.018
 
     Examples
     --------
@@ -234,7 +233,7 @@ def sample(
 def plan_samples(
     sampling: Sampling, inputs: grid_inputs.Inputs, *, excitation: Any, model: Any, solver: Any
 ) -> "SamplePlan":
-    """Plan of the samples of a grid, drawn and checked; errors as of `slipsweep.sample`."""
+    """Return the plan of the samples of a grid, drawn and checked; errors as of `sample`."""
     problem = grid_inputs.check_problem(excitation, model, solver)
     check_drawn(sampling, tuple(inputs.given), problem)
     drawn = sampling.distributions
@@ -263,10 +262,15 @@ def plan_samples(
 
 
 def check_drawn(sampling: Sampling, given: Sequence[str], problem: grid_inputs.Problem) -> None:
-    """Refuse to draw what the model or the shaking does not have, what is given as well, and factors on nothing."""
+    """Raise InputError for draws that cannot be used.
+
+    They are draws of a parameter that the model or the shaking does not have, that is given as
+    well, or of which a factor or an offset has no value to act on.
+    """
     if "structure_frequency" in given:
         raise InputError(
-            "structure_frequency: not allowed with uncertain inputs: the displacement does not depend on it"
+            "structure_frequency: not allowed with uncertain inputs: the displacement does not "
+            "depend on it"
         )
     recorded = not isinstance(problem.excitation, Waveform)
     kinds = (variables.WAVEFORM_INPUTS, variables.RECORD_INPUTS)
@@ -329,9 +333,10 @@ def _obeys_scaling_law(
 
 
 class SamplePlan(plans.Plan):
-    """The samples of every grid point: cells along `solved` dimensions, frequencies along `scaled` ones.
+    """The samples of every grid point: cells along `solved` dimensions, frequencies along `scaled`.
 
-    Along `pooled` dimensions all values meet all draws, and make up the samples of one grid point.
+    Along `pooled` dimensions all values are combined with all draws, and make up the samples of one
+    grid point.
     """
 
     def __init__(
@@ -407,13 +412,13 @@ class SamplePlan(plans.Plan):
         return math.prod(self.solved.values()) * self.runs
 
     def part(self, chunk: chunks.Chunk) -> "SamplePlan":
-        """The plan cut to a chunk of its grid."""
+        """Return the plan cut to a chunk of its grid."""
         return SamplePlan(
             self.sampling, self.problem, chunks.variables_within(chunk, self.coords), self.attrs
         )
 
     def template(self) -> xr.Dataset:
-        """The statistics with their dimensions and coordinates but no values: zeros that take no memory."""
+        """Return the statistics with their coordinates but no values: zeros that take no memory."""
         values: dict[str, Any] = {
             "quantile": self.sampling.quantiles,
             "threshold": self.sampling.thresholds,
@@ -440,7 +445,7 @@ class SamplePlan(plans.Plan):
         return xr.Dataset(results, self.coords | own_coords, self.attrs).drop_dims(self.pooled)
 
     def solve(self, progress: Callable[[int], None] | None = None) -> xr.Dataset:
-        """Solve the samples, a million at a time, and reduce them to what `slipsweep.sample` returns."""
+        """Solve the samples, a million at a time, and return their statistics."""
         parameters.check_progress(progress)
         table = self.template()
         resources.check_memory(
@@ -461,7 +466,7 @@ class SamplePlan(plans.Plan):
     def _statistics(
         self, chunk: chunks.Chunk, progress: Callable[[int], None] | None
     ) -> dict[str, NDArray[Any]]:
-        """The results at the grid points of a chunk, (solved, frequencies, own dimension)."""
+        """Return the statistics at grid points of a chunk, (solved, frequencies, own dimension)."""
         sampling = self.sampling
         sizes = {dim: cut.stop - cut.start for dim, cut in chunk.items()}
         inputs, drawn = self._drawn(chunk, sizes)
@@ -486,8 +491,8 @@ class SamplePlan(plans.Plan):
         def reduce(point: int) -> None:
             values = np.sort(displacement[point])
             values = values[: np.searchsorted(values, np.nan)]  # NaN goes last
-            # these slide without any shaking, or do not stop after it: their displacement has no
-            # value and exceeds every threshold
+            # blocks that slide without any shaking, or do not stop after it, have no displacement;
+            # they exceed every threshold
             unstable = np.count_nonzero(flags[point] & variables.ENDLESS.value)
             if values.size + unstable:
                 above = values.size - np.searchsorted(
@@ -525,7 +530,7 @@ class SamplePlan(plans.Plan):
     def _drawn(
         self, chunk: chunks.Chunk, sizes: dict[str, int]
     ) -> tuple[dict[str, xr.Variable], dict[str, int]]:
-        """Inputs of the runs of a chunk, and their sizes, (solved, pooled, draw): a sweep with one more dimension."""
+        """Return the inputs of the runs of a chunk, and their sizes, (solved, pooled, draw)."""
         inputs = chunks.variables_within(chunk, self.inputs)
         sizes = sizes | self.pooled | {_DRAW: self.sampling.runs}
         drawn = {name: xr.Variable((_DRAW,), draws) for name, draws in self.sampling.draws.items()}

@@ -44,7 +44,7 @@ _ANOTHER = "Test at another amplitude and give calibrate all tests together"
 
 
 def sweep_of(solution: Solution, estimated: Estimate, **changed: Any) -> xr.Dataset:
-    """Return the sweep of the estimated parameters under a test's motion; `changed` replaces some."""
+    """Return the sweep of the estimated parameters, or `changed` ones, under a test's motion."""
     observation = solution.observation
     best = dict(zip(SOUGHT, map(float, estimated.parameters), strict=True))
     return sweep(
@@ -94,8 +94,8 @@ def report(
     if (results["validity"] & variables.Validity.NOT_RECOUPLED).any():
         sentences.append(
             "The computed block does not come to rest before the next slide begins (flag "
-            "not_recoupled). Small errors of the table's motion may then change the motion much: the "
-            "intervals may be too narrow."
+            "not_recoupled). Small errors of the table's motion may then change the motion much: "
+            "the intervals may be too narrow."
         )
     if constant is not None and not clipped:
         tables = sweep_tables.newmark_tables(observations[0], constant)
@@ -142,8 +142,8 @@ def _upslope_slips(observation: Observation) -> list[str]:
         return []
     many = f"{len(times)} time{'s' if len(times) > 1 else ''}"
     return [
-        f"The block slipped upslope {many} (first at {times[0]:.3g} s). In stick-slip the model has "
-        "no upslope slip: these samples are left out, and the displacement may step there."
+        f"The block slipped upslope {many} (first at {times[0]:.3g} s). In stick-slip the model "
+        "has no upslope slip: these samples are left out, and the displacement may step there."
     ]
 
 

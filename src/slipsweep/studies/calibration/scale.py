@@ -1,4 +1,4 @@
-"""Scaled parameters of the search, and the same of a test: Üy, λ, Δμ and lines of the table's sensor."""
+"""Scaled parameters of the search, and the readings of the model that they stand for."""
 
 import itertools
 import math
