@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from slipsweep.errors import InputError
 from slipsweep.model import options, parameters, variables
 from slipsweep.motion.shaking import TABLE, ShakingTest
-from slipsweep.studies.calibration.estimate import Estimate, cycle_estimate, estimate
+from slipsweep.studies.calibration.estimate import Estimate, Fit, best_fit, cycle_estimate, estimate
 from slipsweep.studies.calibration.likelihood import SOUGHT, Observation, runs_of
 from slipsweep.studies.calibration.measured_friction import (
     BOUND,
@@ -149,17 +149,18 @@ def calibrate(
         1, "blas"
     ):  # its threads wait for each other: ten times as long on a busy machine
         observations = observed()
-        found = estimate(observations)
-        if "continuous" not in found.readings:
+        fit = best_fit(observations)
+        if "continuous" not in fit.readings:
             for one in observations:
-                one.leave_out_upslope_slips(found.of_test(one))
+                one.leave_out_upslope_slips(fit.of_test(one))
             if any(one.upslope for one in observations):
-                found = estimate(observations)
+                fit = best_fit(observations)
+        found = estimate(fit)
         statics = [_statics(one, found) for one in observations]
         constant = next((one for one in statics if one.attrs["constant_friction"]), None)
         clipped = [text for one, name in _named(observations) for text in _clipped(one, name)]
         is_explained = constant is not None or bool(clipped)
-        misfit = [] if is_explained else _misfit(found, lambda name: estimate(observed(name)))
+        misfit = [] if is_explained else _misfit(found, lambda name: best_fit(observed(name)))
         parts = [_of_test(one, found, cycles) for one in observations]
         whole = (
             parts[0]
@@ -480,7 +481,7 @@ def _colours(one: Observation, name: str) -> list[str]:
     return texts
 
 
-def _misfits(found: Estimate) -> dict[str, float]:
+def _misfits(found: Estimate | Fit) -> dict[str, float]:
     """Channels whose misfit is more than 1.5 times their noise and 1 % of their largest value, and how many times."""
     worse: dict[str, float] = {}
     for one in found.observations:
@@ -498,7 +499,7 @@ def _misfits(found: Estimate) -> dict[str, float]:
     return worse
 
 
-def _misfit(found: Estimate, with_drift: Callable[[str], Estimate]) -> list[str]:
+def _misfit(found: Estimate, with_drift: Callable[[str], Fit]) -> list[str]:
     """Which channels are not explained, and which of them an offset and a drift, that were not given, would explain."""
     if not (misfits := _misfits(found)):
         return []

@@ -5,6 +5,7 @@ table's acceleration, Üy may.  A standard error describes neither, so an interv
 likelihood's, the union over these branches, each compared with its own least (docs/calibration.md).
 """
 
+import copy
 import functools
 import itertools
 import math
@@ -27,6 +28,9 @@ Readings = tuple[str, ...]
 #: it is refuted.
 SQUARE = QUANTILE**2
 REFUTED = 9.0
+
+#: Accelerations of the table in a pulse, in parts of its peak, by which `Scale.reading` decides.
+_TO_PEAK = np.linspace(0.0, 1.0, 65)[1:]
 
 #: Bounds of the search: Üy over the table's peak A, λA/g, ln(1 + Δμ/μs); how far an offset of the
 #: table's sensor, and a drift over the test, may be from where the search begins, in parts of A.
@@ -119,7 +123,7 @@ class Scale:
         "held", Üy; "crossed", that at the crossing.
         """
         onset, decay, excess = point[:3]
-        table = np.linspace(0.0, 1.0, 65)[1:] * peak
+        table = _TO_PEAK * peak
         coupled = (
             self.mu_s - self.tan_theta - self.mu_s * np.exp(excess - decay * table / self.peak)
         )
@@ -431,8 +435,26 @@ class Estimate(NamedTuple):
         return sweep(one.theta, one.mu_s, excitation=record, model=one.model, **given)
 
 
-def estimate(observations: Sequence[Observation]) -> Estimate:
-    """Calibrate one or several tests of one interface."""
+class Fit(NamedTuple):
+    """The best fit of one or several tests, by the search that found it."""
+
+    scale: Scale
+    search: Search
+    observations: Sequence[Observation]
+
+    @property
+    def readings(self) -> set[str]:
+        """Return what decides the acceleration at the points tried that the data allow."""
+        return {reading for one in self.search.allowed() for reading in one.readings}
+
+    def of_test(self, observation: Observation) -> Floats:
+        """Return Üy, λ and Δμ, and offset and drift of the table's sensor in a test."""
+        number = [each is observation for each in self.observations].index(True)
+        return self.scale.of_test(self.search.best, number)
+
+
+def best_fit(observations: Sequence[Observation]) -> Fit:
+    """Fit one or several tests of one interface; noise and samples at jumps settle with the fit."""
     scale = Scale(observations)
     starts = _first_minima(observations, scale)
     change = math.inf
@@ -449,6 +471,12 @@ def estimate(observations: Sequence[Observation]) -> Estimate:
             one.settle(*_solutions(scale, starts, number))
             for number, one in enumerate(observations)
         )
+    return Fit(scale, search, observations)
+
+
+def estimate(fit: Fit) -> Estimate:
+    """Return what the tests of a fit say of the parameters: errors and intervals beside the best."""
+    scale, search, observations = fit
     width = QUANTILE * np.sqrt(np.diag(_covariance(search.slopes(search.best))))
     intervals = search.intervals(np.where(np.isfinite(width), np.clip(width, 1e-5, 0.3), 0.1))
     intervals, allowed = _linearised_anew(search, intervals, observations, scale)
@@ -495,39 +523,39 @@ def _linearised_anew(
     were linearised.  Far from it, at the ends of the interval of Üy and at the best of other
     branches, they are linearised once more, with the motion of the table that is likely there.
     """
-    best = search.best
-    base = [one.wrong for one in observations]
+    _linearise(observations, scale, search.best, [one.wrong for one in observations])
     every = [np.transpose(intervals)]
     allowed = search.allowed()
 
-    def near(before: Search, point: Floats) -> Search | None:
-        """Return a search linearised at a point; None if that changes little."""
+    def near(
+        before: Search, tests: Sequence[Observation], point: Floats
+    ) -> tuple[Search, Sequence[Observation]] | None:
+        """Return a search and its tests linearised at a point; None if that changes little."""
         square = before.square(point)
-        _linearise(observations, scale, point, _likely_motions(scale, observations, point))
-        after = _search_at(scale, observations)
+        motions = _likely_motions(scale, tests, point)
+        moved = [copy.copy(one) for one in tests]
+        _linearise(moved, scale, point, motions)
+        after = _search_at(scale, moved)
         after.adopt(search)
         after.polish(point, free=range(1, point.size), most=6)
         changes = after.least_tried() < square - _NOT_LINEAR
-        return after if changes and after.allowed() else None
+        return (after, moved) if changes and after.allowed() else None
 
     width = float(np.clip(0.1 * np.ptp(intervals[0]), 1e-5, 0.3))
     for side in (-1, 1):
-        _linearise(observations, scale, best, base)
-        before = search
+        linearised = search, observations
         for _ in range(_TURNS):
-            after = near(before, before.outermost(side))
-            if after is None:
+            turned = near(*linearised, linearised[0].outermost(side))
+            if turned is None:
                 break
-            after.end(0, side, width)
-            allowed += after.allowed()
-            before = after
+            linearised = turned
+            linearised[0].end(0, side, width)
+            allowed += linearised[0].allowed()
     for point in search.refuted_narrowly():
-        _linearise(observations, scale, best, base)
-        after = near(search, point)
-        if after is not None:
-            every.append(np.transpose(after.intervals(np.full(3, 0.05))))
-            allowed += after.allowed()
-    _linearise(observations, scale, best, base)
+        turned = near(search, observations, point)
+        if turned is not None:
+            every.append(np.transpose(turned[0].intervals(np.full(3, 0.05))))
+            allowed += turned[0].allowed()
     points = np.vstack([*every, [one.point[:3] for one in allowed]])
     return np.column_stack([points.min(axis=0), points.max(axis=0)]), allowed
 
