@@ -20,8 +20,9 @@ from slipsweep.kernels.walk import solve_walk, workspace_of
 from slipsweep.model import equations as eq
 from slipsweep.motion.paths import Path, values_at
 
-#: Rows of the first log that is tried; one of which a single pulse has more is made twice as long.
-_ROWS = 1024
+#: Rows of the first log that is tried, enough for most records at once; one of which a single pulse
+#: has more is made twice as long.
+_ROWS = 8192
 
 
 class History(NamedTuple):

@@ -17,7 +17,14 @@ from slipsweep.studies.calibration.corrected import (
     corrected_channels,
     friction_by_statics,
 )
-from slipsweep.studies.calibration.estimate import Estimate, Solution, cycle_estimate, estimate
+from slipsweep.studies.calibration.estimate import (
+    Estimate,
+    Fit,
+    Solution,
+    best_fit,
+    cycle_estimate,
+    estimate,
+)
 from slipsweep.studies.calibration.measured_friction import (
     BOUND,
     SOURCE,
@@ -139,13 +146,13 @@ def calibrate(
 
     # threads of BLAS wait for each other: ten times as long on a busy machine
     with threadpool_limits(1, "blas"):
-        estimated = _estimate(observed())
+        estimated = estimate(_fit(observed()))
         statics = [friction_by_statics(solution) for solution in estimated.solutions]
         constant = next((each for each in statics if each.attrs["constant_friction"]), None)
         clipped = findings.clipped_channels(estimated)
         misfit: list[str] = []
         if constant is None and not clipped:
-            misfit = findings.unexplained_channels(estimated, lambda name: estimate(observed(name)))
+            misfit = findings.unexplained_channels(estimated, lambda name: best_fit(observed(name)))
         parts = [_of_test(solution, estimated, cycles) for solution in estimated.solutions]
         results = parts[0]
         if len(parts) > 1:
@@ -164,16 +171,16 @@ def calibrate(
     return results
 
 
-def _estimate(observations: Sequence[Observation]) -> Estimate:
-    """Return the estimate, without samples of slips upslope, which stick-slip does not have."""
-    estimated = estimate(observations)
-    if "continuous" in estimated.readings:
-        return estimated
-    for solution in estimated.solutions:
+def _fit(observations: Sequence[Observation]) -> Fit:
+    """Return the best fit, without samples of slips upslope, which stick-slip does not have."""
+    fit = best_fit(observations)
+    if "continuous" in fit.readings:
+        return fit
+    for solution in fit.solutions:
         solution.observation.leave_out_upslope_slips(solution.parameters)
     if any(observation.upslope for observation in observations):
-        return estimate(observations)
-    return estimated
+        return best_fit(observations)
+    return fit
 
 
 def _of_test(solution: Solution, estimated: Estimate, cycles: bool) -> xr.Dataset:

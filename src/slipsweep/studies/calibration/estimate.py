@@ -6,6 +6,7 @@ beside jumps are estimated, and the search is repeated until they no longer chan
 those of `search.Search`, widened where the residuals are not linear (docs/calibration.md).
 """
 
+import copy
 import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -114,7 +115,11 @@ class JointLikelihood:
     """Likelihoods of all tests, each linearised near a point of the search."""
 
     def __init__(
-        self, scale: Scale, observations: Sequence[Observation], point: Floats, rough: float
+        self,
+        scale: Scale,
+        observations: Sequence[Observation],
+        point: Floats,
+        rough: float = 0.0,
     ) -> None:
         self.scale = scale
         self.observations = observations
@@ -130,11 +135,17 @@ class JointLikelihood:
         """Linearise anew, near another point (`rough` as of `Likelihood`)."""
         self.likelihoods = self._near(point, rough)
 
-    def linearize_with(self, point: Floats, table_errors: Sequence[Floats]) -> None:
-        """Linearise near a point, with these errors of the table's motion of each test."""
-        for observation, errors in zip(self.observations, table_errors, strict=True):
-            observation.table_errors = errors
-        self.linearize(point)
+    def moved_to(self, point: Floats) -> "JointLikelihood":
+        """Return the likelihoods near another point, with the motion of the table likely there.
+
+        They have copies of the observations: these here do not change.
+        """
+        observations = []
+        for number, likelihood in enumerate(self.likelihoods):
+            observation = copy.copy(likelihood.observation)
+            observation.table_errors = likelihood.likely_motion(self.scale.of_test(point, number))
+            observations.append(observation)
+        return JointLikelihood(self.scale, observations, point)
 
     def residuals(self, point: Floats) -> Floats:
         """Return independent residuals of all tests."""
@@ -151,13 +162,6 @@ class JointLikelihood:
             self.scale.reading(point, observation.peak_of(self.scale.of_test(point, number)[3:]))
             for number, observation in enumerate(self.observations)
         )
-
-    def likely_motions(self, point: Floats) -> list[Floats]:
-        """Return the most likely errors of the table's motion of each test at a point."""
-        return [
-            likelihood.likely_motion(self.scale.of_test(point, number))
-            for number, likelihood in enumerate(self.likelihoods)
-        ]
 
     def settle(self, points: Sequence[Floats]) -> float:
         """Estimate noise and the table's motion by the first of some points that may be right.
@@ -180,10 +184,32 @@ class JointLikelihood:
         return self.search()
 
 
-def estimate(observations: Sequence[Observation]) -> Estimate:
-    """Calibrate one or several tests of one interface."""
-    scale = Scale(observations)
-    joint, search = _settled_search(scale, observations)
+class Fit(NamedTuple):
+    """The best fit of one or several tests: their likelihoods, and the search that found it."""
+
+    joint: JointLikelihood
+    search: Search
+
+    @property
+    def readings(self) -> set[str]:
+        """What decides the acceleration of the block at the points that the data allow."""
+        return {reading for tried in self.search.allowed() for reading in tried.readings}
+
+    @property
+    def solutions(self) -> list[Solution]:
+        """The solution for each test, without standard errors."""
+        none = np.full(2, np.nan)
+        solutions = []
+        for number, likelihood in enumerate(self.joint.likelihoods):
+            parameters = self.joint.scale.of_test(self.search.best, number)
+            solutions.append(Solution(likelihood, parameters, none[: parameters.size - 3]))
+        return solutions
+
+
+def estimate(fit: Fit) -> Estimate:
+    """Return errors and intervals of the parameters beside their best values."""
+    joint, search = fit
+    scale = joint.scale
     width = QUANTILE * np.sqrt(np.diag(covariance(search.slopes(search.best))))
     intervals = search.intervals(np.where(np.isfinite(width), np.clip(width, 1e-5, 0.3), 0.1))
     intervals, allowed = _linearised_anew(search, intervals, joint)
@@ -225,10 +251,12 @@ def estimate(observations: Sequence[Observation]) -> Estimate:
     )
 
 
-def _settled_search(
-    scale: Scale, observations: Sequence[Observation]
-) -> tuple[JointLikelihood, Search]:
-    """Return the search whose noise, table motions and samples at jumps have settled."""
+def best_fit(observations: Sequence[Observation]) -> Fit:
+    """Fit one or several tests of one interface.
+
+    Noise, the motion of the tables and the samples at jumps settle with the fit.
+    """
+    scale = Scale(observations)
     joint, points = _first_minima(scale, observations)
     change = math.inf
     for turn in range(_ROUNDS):
@@ -241,7 +269,7 @@ def _settled_search(
             break
         points = search.candidates()
         change = joint.settle(points)
-    return joint, search
+    return Fit(joint, search)
 
 
 def _linearised_anew(
@@ -253,46 +281,40 @@ def _linearised_anew(
     were linearised.  Far from it, at the ends of the interval of Üy and at the best of other
     branches, they are linearised once more, with the motion of the table that is likely there.
     """
-    best = search.best
-    table_errors = [observation.table_errors for observation in joint.observations]
+    joint.linearize(search.best)
     ends = [np.transpose(intervals)]
     allowed = search.allowed()
     width = float(np.clip(0.1 * np.ptp(intervals[0]), 1e-5, 0.3))
     for side in (-1, 1):
-        joint.linearize_with(best, table_errors)
-        before = search
+        before = Fit(joint, search)
         for _ in range(_TURNS):
-            after = _search_linearised_at(before.outermost(side), before, search, joint)
+            after = _linearised_at(before.search.outermost(side), before, search)
             if after is None:
                 break
-            after.end(0, side, width)
-            allowed += after.allowed()
+            after.search.end(0, side, width)
+            allowed += after.search.allowed()
             before = after
     for point in search.refuted_narrowly():
-        joint.linearize_with(best, table_errors)
-        after = _search_linearised_at(point, search, search, joint)
+        after = _linearised_at(point, Fit(joint, search), search)
         if after is not None:
-            ends.append(np.transpose(after.intervals(np.full(3, 0.05))))
-            allowed += after.allowed()
-    joint.linearize_with(best, table_errors)
+            ends.append(np.transpose(after.search.intervals(np.full(3, 0.05))))
+            allowed += after.search.allowed()
     points = np.vstack([*ends, [tried.point[:3] for tried in allowed]])
     return np.column_stack([points.min(axis=0), points.max(axis=0)]), allowed
 
 
-def _search_linearised_at(
-    point: Floats, before: Search, first: Search, joint: JointLikelihood
-) -> Search | None:
+def _linearised_at(point: Floats, before: Fit, first: Search) -> Fit | None:
     """Return a search linearised at a point; None if that changes little or allows nothing.
 
-    `before` is the search that led to the point, and `first` the one whose least counts, too.
+    `before` led to the point, and the least of the search `first` counts, too.
     """
-    square = before.square(point)
-    joint.linearize_with(point, joint.likely_motions(point))
-    after = joint.search()
-    after.adopt(first)
-    after.polish(point, free=range(1, point.size), most=6)
-    changes = after.least_tried() < square - _NOT_LINEAR
-    return after if changes and after.allowed() else None
+    square = before.search.square(point)
+    joint = before.joint.moved_to(point)
+    search = joint.search()
+    search.adopt(first)
+    search.polish(point, free=range(1, point.size), most=6)
+    changes = search.least_tried() < square - _NOT_LINEAR
+    return Fit(joint, search) if changes and search.allowed() else None
 
 
 def _errors(deviations: Floats, best: Floats, low: Floats, high: Floats) -> Floats:

@@ -19,7 +19,7 @@ from slipsweep.studies.calibration.corrected import (
     slides_in,
     table_at_samples,
 )
-from slipsweep.studies.calibration.estimate import Estimate, Solution
+from slipsweep.studies.calibration.estimate import Estimate, Fit, Solution
 from slipsweep.studies.calibration.measured_friction import onset_acceleration
 from slipsweep.studies.calibration.noise import flat_top, noisy_flat_top
 from slipsweep.studies.calibration.observation import SOUGHT, Observation
@@ -206,7 +206,7 @@ def _coloured_noise(observation: Observation, name: str) -> list[str]:
     return texts
 
 
-def _misfits_in_noise(estimated: Estimate) -> dict[str, float]:
+def _misfits_in_noise(estimated: Estimate | Fit) -> dict[str, float]:
     """Return the channels whose misfit is larger than their noise, and how many times."""
     larger: dict[str, float] = {}
     for solution in estimated.solutions:
@@ -224,11 +224,11 @@ def _misfits_in_noise(estimated: Estimate) -> dict[str, float]:
     return larger
 
 
-def unexplained_channels(estimated: Estimate, with_drift: Callable[[str], Estimate]) -> list[str]:
+def unexplained_channels(estimated: Estimate, with_drift: Callable[[str], Fit]) -> list[str]:
     """Return which channels the fit does not explain, in words.
 
-    For each that may drift, `with_drift` estimates with an offset and a drift of it; a sentence
-    says if these explain it.
+    For each that may drift, `with_drift` fits with an offset and a drift of it; a sentence says if
+    these explain it.
     """
     misfits = _misfits_in_noise(estimated)
     if not misfits:

@@ -19,6 +19,9 @@ MOST = np.array([1.0, 20.0, 3.0])
 #: the search begins, in parts of A.
 _TABLE_LINE = 0.5
 
+#: Accelerations of the table in a pulse, in parts of its peak, by which `Scale.reading` decides.
+_TO_PEAK = np.linspace(0.0, 1.0, 65)[1:]
+
 
 class Scale:
     """Conversion between points of the search and parameters of a test.
@@ -79,7 +82,7 @@ class Scale:
         )
         if peak > limit:
             return "continuous"
-        table = np.linspace(0.0, 1.0, 65)[1:] * peak
+        table = _TO_PEAK * peak
         response = self._block_acceleration(table, decay=point[1], excess=point[2])
         above = table > yield_acceleration
         slides = above & (response < table)
