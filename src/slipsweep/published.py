@@ -190,7 +190,7 @@ class Equation:
     def range_text(self) -> str:
         """Range in words: ``ky/PGA 0.1 to 0.9``."""
         names = {"ratio": "ky/PGA", "yield_coefficient": "ky", "magnitude": "M"}
-        parts = (f"{names[one]} {low:g} to {high:g}" for one, (low, high) in self.bounds.items())
+        parts = (f"{names[name]} {low:g} to {high:g}" for name, (low, high) in self.bounds.items())
         return ", ".join(parts)
 
 
@@ -246,7 +246,7 @@ def _estimate(
     deviation = np.where(rests, 0.0, log_standard_deviation)
     zero = np.where(rests, 1.0, zero_probability)
     parts = (median, deviation, zero, in_range)
-    return Estimate(*(np.broadcast_to(one, shape)[()] for one in parts))
+    return Estimate(*(np.broadcast_to(part, shape)[()] for part in parts))
 
 
 def ambraseys_menu_1988(yield_coefficient: Values, pga: Values) -> Estimate:

@@ -20,6 +20,7 @@ from slipsweep.charts.slices import Result
 from slipsweep.charts.style import Look
 from slipsweep.errors import InputError
 from slipsweep.model.options import MODELS, Mendez, Model, Newmark
+from slipsweep.model.units import in_mm
 from slipsweep.model.variables import CAUTIONS, STRENGTHS, has_signed_displacements
 from slipsweep.studies.boundaries import has_flags
 from slipsweep.studies.cautions import reliable
@@ -106,7 +107,7 @@ def dimensionless(result: Result, options: style.Options) -> Figure:
 
 def _drawn(sheet: Sheet, name: str, scaled: bool = False) -> Figure:
     """Draw the curves of a result; if `scaled`, as uω²/A over A/Üy."""
-    factor: Any = 1000.0 if style.unit(name) == "m" else 1.0
+    factor: Any = in_mm(1.0) if style.unit(name) == "m" else 1.0
     units, least = ("mm", 1.0) if factor > 1 else (sheet.options.unit(name), None)
     label = f"{style.result_text(sheet.data.attrs, name)} ({units})".removesuffix(" ()")
     sheet.show(name, "Barred curves")
@@ -116,8 +117,8 @@ def _drawn(sheet: Sheet, name: str, scaled: bool = False) -> Figure:
         least = 1e-4
         factor = (2 * np.pi * sheet.data["frequency"]) ** 2 / sheet.data["amplitude"]
         sheet.data["over_yield"] = sheet.data["amplitude"] / sheet.data["yield_line"]
-    for one in {"drawn", "newmark"} & {*sheet.data}:
-        sheet.data[one] = sheet.data[one] * factor
+    for drawn in {"drawn", "newmark"} & {*sheet.data}:
+        sheet.data[drawn] = sheet.data[drawn] * factor
     # the paper's axis of A/Üy begins at the yield acceleration
     values = sheet.data["drawn"].where(sheet.data["over_yield"] > 1 if scaled else True).values
     for panel in sheet.panels:
@@ -164,18 +165,17 @@ def spread(result: Result, options: style.Options) -> Figure:
     sheet = result.sheet(options, result.compared(DISPLACEMENT), DRIVES)
     # the other options have a mode limit, even if this result has none
     sheet.show(DISPLACEMENT, "Barred, of this result", always=True)
-    sheet.data["drawn"] = sheet.data["drawn"] * 1000.0
-    own = MODELS.from_attributes(sheet.data.attrs)
+    sheet.data["drawn"] = in_mm(sheet.data["drawn"])
+    model_of_result = MODELS.from_attributes(sheet.data.attrs)
     looks = {}
     flags = []
-    for text, model, changed, look in _alternatives(own):
-        answer = solve_again(sheet.data, [DISPLACEMENT, "validity"], model, **changed).reset_coords(
-            drop=True
-        )
-        sheet.data[text] = reliable(answer, DISPLACEMENT, options.show_cautions) * 1000.0
+    for text, model, changed, look in _alternatives(model_of_result):
+        answer = solve_again(sheet.data, [DISPLACEMENT, "validity"], model, **changed)
+        answer = answer.reset_coords(drop=True)
+        sheet.data[text] = in_mm(reliable(answer, DISPLACEMENT, options.show_cautions))
         looks[text] = {"linewidth": 1.0, "markersize": 3.5, **look}
         flags.append(answer["validity"])
-    text = f"this result:\n{_own_text(own, sheet.data)}"
+    text = f"this result:\n{_own_text(model_of_result, sheet.data)}"
     sheet.data[text] = sheet.data["drawn"]
     looks[text] = {"color": "black", "linewidth": 2.4, "zorder": 2.5}
     for panel in sheet.panels:
@@ -202,39 +202,39 @@ def spread(result: Result, options: style.Options) -> Figure:
     return sheet.done()
 
 
-def _alternatives(own: Model) -> Iterator[tuple[str, Model, dict[str, Any], Look]]:
+def _alternatives(model: Model) -> Iterator[tuple[str, Model, dict[str, Any], Look]]:
     """Yield the options beside those of a result.
 
     Each has its name in the legend, its model, its changed parameters and its look.
     """
-    if isinstance(own, Mendez):
+    if isinstance(model, Mendez):
         look: Look = {"color": "0.35", "linestyle": "-", "marker": "x"}
-        yield style.NEWMARK, Newmark(g=own.g), {}, look
-    ours = own if isinstance(own, Mendez) else Mendez(g=own.g)
+        yield style.NEWMARK, Newmark(g=model.g), {}, look
+    base = model if isinstance(model, Mendez) else Mendez(g=model.g)
     for (recoupling, (end, colours)), (decay, (changed, dash)) in itertools.product(
         _ENDS.items(), _DECAYS.items()
     ):
         yield (
             f"{decay}, stop by {end}",
-            replace(ours, recoupling=recoupling),
+            replace(base, recoupling=recoupling),
             changed,
             colours | dash,
         )
 
 
-def _own_text(own: Model, data: xr.Dataset) -> str:
+def _own_text(model: Model, data: xr.Dataset) -> str:
     """Return the options of a result in words."""
-    if not isinstance(own, Mendez):
+    if not isinstance(model, Mendez):
         return style.NEWMARK
-    given = data.coords.get("decay_rate")
+    decay_rate = data.coords.get("decay_rate")
     decay = (
         "λ by Eq. 6"
-        if given is None
-        else f"λ = {given.item():.3g}"
-        if given.size == 1
+        if decay_rate is None
+        else f"λ = {decay_rate.item():.3g}"
+        if decay_rate.size == 1
         else "λ as given"
     )
-    return f"{decay}, stop by {_ENDS[own.recoupling][0]}"
+    return f"{decay}, stop by {_ENDS[model.recoupling][0]}"
 
 
 def _curves(panel: Panel, array: xr.DataArray, gaps: bool = True) -> list[Curve]:
@@ -245,7 +245,7 @@ def _curves(panel: Panel, array: xr.DataArray, gaps: bool = True) -> list[Curve]
     if "limit_line" not in panel.data or not gaps:
         return curves
     beyond = panel.grid("amplitude") > panel.grid("limit_line")
-    jumps = [np.flatnonzero(one[1:] != one[:-1]) + 1 for one in beyond]
+    jumps = [np.flatnonzero(row[1:] != row[:-1]) + 1 for row in beyond]
     return [
         (np.insert(xs, at, xs[at]), np.insert(ys, at, np.nan))
         for (xs, ys), at in zip(curves, jumps, strict=True)
@@ -270,8 +270,8 @@ def _draw_newmark(sheet: Sheet, panel: Panel, looks: list[Look]) -> None:
     for (xs, ys), look in zip(
         _curves(panel, panel.data["newmark"], gaps=False), looks, strict=True
     ):
-        own = _NEWMARK | ({"linestyle": look["linestyle"]} if panel.y else single)
-        panel.axes.plot(xs, np.where(ys > 0, ys, np.nan), gid="newmark", **own)
+        newmark_look = _NEWMARK | ({"linestyle": look["linestyle"]} if panel.y else single)
+        panel.axes.plot(xs, np.where(ys > 0, ys, np.nan), gid="newmark", **newmark_look)
     text = f"{style.NEWMARK} (same dash)" if panel.y else style.NEWMARK
     sheet.remarks[text] = Line2D([], [], **_NEWMARK | ({} if panel.y else single))
 

@@ -14,6 +14,7 @@ from slipsweep.charts import style
 from slipsweep.charts.sheet import Drawing
 from slipsweep.charts.slices import Result
 from slipsweep.charts.style import BLUE, VERMILION, Look, Options
+from slipsweep.model.units import in_mm
 from slipsweep.model.variables import SlidingMode
 from slipsweep.studies.boundaries import thresholds
 from slipsweep.studies.cautions import slides_back_text
@@ -42,7 +43,7 @@ _LABELS = ("acceleration\n(m/s²)", "friction\ncoefficient")
 _CHANNELS = {
     "block_acceleration": ("acceleration of\nthe block (m/s²)", 1.0, "m/s²"),
     "relative_velocity": ("relative\nvelocity (m/s)", 1.0, "m/s"),
-    "relative_displacement": ("relative\ndisplacement (mm)", 1000.0, "mm"),
+    "relative_displacement": ("relative\ndisplacement (mm)", in_mm(1.0), "mm"),
 }
 
 
@@ -87,7 +88,7 @@ def history(result: Result, options: Options) -> Figure:
         _plot(panel, data, "friction_coefficient")
     _plot(velocity, data, "relative_velocity")
     factor, unit = (
-        (1.0, "m") if (np.abs(data["relative_displacement"]) >= 1.0).any() else (1000.0, "mm")
+        (1.0, "m") if (np.abs(data["relative_displacement"]) >= 1.0).any() else (in_mm(1.0), "mm")
     )
     _plot(displacement, data, "relative_displacement", factor)
     labels = [
@@ -111,20 +112,21 @@ def _draw_thresholds(panel: Axes, data: xr.Dataset) -> None:
         if np.isfinite(value) and 1.5 * lowest <= value <= 1.5 * highest:
             text, look = style.LINES.get(str(name), style.LINES["yield_line"])
             label = None if name == "upslope_line" else text
-            own = {**look, "linewidth": 0.9, "zorder": 1.5}
-            panel.axhline(value.item(), label=label, gid=name, **own)
+            thin = {**look, "linewidth": 0.9, "zorder": 1.5}
+            panel.axhline(value.item(), label=label, gid=name, **thin)
 
 
 def _draw_modes(panel: Axes, data: xr.Dataset) -> None:
     """Draw a box for each positive half wave of a record, by the sliding mode of its peak."""
     start, end, mode = (data[f"half_wave_{name}"].values for name in ("start", "end", "mode"))
     entries = []
-    for one, look in _MODES.items():
-        which = mode == one
+    for sliding_mode, look in _MODES.items():
+        which = mode == sliding_mode
         if which.any():
             spans = list(zip(start[which], (end - start)[which], strict=True))
-            panel.broken_barh(spans, (0.0, 1.0), gid=one.name.lower(), **look)
-        entries.append(Patch(label=f"{style.MODE_TEXT[one]} ({np.count_nonzero(which)})", **look))
+            panel.broken_barh(spans, (0.0, 1.0), gid=sliding_mode.name.lower(), **look)
+        text = f"{style.MODE_TEXT[sliding_mode]} ({np.count_nonzero(which)})"
+        entries.append(Patch(label=text, **look))
     panel.set(ylim=(0.0, 1.0), yticks=[])
     panel.tick_params(axis="x", bottom=False)
     panel.set_ylabel("half\nwaves", rotation=0, ha="right", va="center", fontsize="small")
@@ -233,10 +235,10 @@ def _parameters(table: xr.Dataset) -> str:
     for name, unit in (("yield_acceleration", "m/s²"), ("decay_rate", ""), ("delta_mu", "")):
         low, high = table[f"{name}_interval"].values
         ends = f"{low:.3g} to {high:.3g}" if np.isfinite(high) else f"{low:.3g} or more"
-        known = bool(table[f"{name}_error"].notnull())
+        is_determined = bool(table[f"{name}_error"].notnull())
         value = f"= {style.with_unit(f'{table[name].item():.4g}', unit)} ({ends})"
         parts.append(
             f"{style.SYMBOLS[name]} "
-            f"{value if known else f'not determined ({style.with_unit(ends, unit)})'}"
+            f"{value if is_determined else f'not determined ({style.with_unit(ends, unit)})'}"
         )
     return f"{', '.join(parts)}; 95 % intervals\n{_interface_text(table)}"

@@ -80,9 +80,9 @@ def kinds_of(sort: str) -> dict[str, Draw]:
 
 def check_kind(kind: str) -> str:
     """Return `kind` if there is such a chart (InputError otherwise)."""
-    known = [name for sort in SORTS for name in kinds_of(sort)]
-    if kind not in known:
-        raise InputError(f"--kind {kind}: no such chart; {did_you_mean(kind, known)}")
+    kinds = [name for sort in SORTS for name in kinds_of(sort)]
+    if kind not in kinds:
+        raise InputError(f"--kind {kind}: no such chart; {did_you_mean(kind, kinds)}")
     return kind
 
 

@@ -21,6 +21,7 @@ from slipsweep.charts.style import Floats, Look, Options
 from slipsweep.charts.suites import draw_suite, suite_text
 from slipsweep.errors import InputError
 from slipsweep.files.selection import axis_labels
+from slipsweep.model.units import in_mm
 from slipsweep.model.variables import STRENGTHS, LimitStatus, StrengthStatus
 from slipsweep.published import EQUATIONS
 from slipsweep.studies.suite_statistics import SUITE, limit_quantiles
@@ -115,7 +116,7 @@ def _draw_points(
     panel.axes.set_xlim(*ends)
     points = values.transpose("motion", ...).values.reshape(xs.size, -1)
     polarities = panel.data["polarity"].values if "polarity" in values.dims else ()
-    names = [f"polarity {one:g}" for one in polarities] or ["a motion"]
+    names = [f"polarity {polarity:g}" for polarity in polarities] or ["a motion"]
     look: Look = {"linestyle": "", "markerfacecolor": "white", "color": "0.2"}
     for name, row, marker in zip(names, points.T, "os", strict=False):
         (sheet.legend[name],) = panel.axes.plot(xs, row, marker=marker, **look)
@@ -202,8 +203,8 @@ def _suite_text(data: xr.Dataset) -> str:
     """Return the caption: motions of the median, and those that have no limit."""
     status = data["limit_status"].values
     beyond, invalid = (
-        int(np.count_nonzero(status == one))
-        for one in (LimitStatus.NOT_REACHED, LimitStatus.INVALID)
+        int(np.count_nonzero(status == code))
+        for code in (LimitStatus.NOT_REACHED, LimitStatus.INVALID)
     )
     texts = [f"Median and band are of {suite_text(data['limit_amplitude'].sizes)}."]
     if beyond:
@@ -220,7 +221,7 @@ def _suite_text(data: xr.Dataset) -> str:
 def drawn_thresholds(data: xr.Dataset, requested: Floats) -> Floats:
     """Return displacements, m, of a smooth curve of rates, among them those requested."""
     most = max(np.nanmax(data["permanent_displacement"].values), requested[-1])
-    least = min([one for one in requested if one > 0.0] + [most]) / 10.0
+    least = min([displacement for displacement in requested if displacement > 0.0] + [most]) / 10.0
     return np.union1d(np.geomspace(least, most, 121) if most > 0.0 else [], requested)
 
 
@@ -244,11 +245,11 @@ def hazard(result: Result, options: Options) -> Figure:
     if len(names) > _MOST_CURVES:
         most = f"a chart shows {_MOST_CURVES} at most; cut axes with --at NAME=VALUE"
         raise InputError(f"{len(names)} grid points: {most}")
-    wanted = rates["threshold"].values
-    few = wanted.size <= _MOST_MARKS
-    marks = np.isin(wanted, wanted if few else rates.attrs.get("marked", []))
+    thresholds = rates["threshold"].values
+    few = thresholds.size <= _MOST_MARKS
+    marks = np.isin(thresholds, thresholds if few else rates.attrs.get("marked", []))
     lines, held = (
-        rates[name].values.reshape(-1, wanted.size) for name in ("annual_rate", "held_rate")
+        rates[name].values.reshape(-1, thresholds.size) for name in ("annual_rate", "held_rate")
     )
     if not (lines[:, marks if marks.any() else slice(None)] > 0.0).any():
         raise InputError(
@@ -263,19 +264,20 @@ def hazard(result: Result, options: Options) -> Figure:
         ylabel=f"mean annual rate of {style.displacement_symbol(rates.attrs)} > d (1/year)",
     )
     panel.grid(color="0.9", which="both")
+    displacements = in_mm(thresholds)
     for look, name, line, part in zip(curve_looks(len(names)), names, lines, held, strict=True):
-        shown = np.where((line > 0.0) & (wanted > 0.0), line, np.nan)
+        shown = np.where((line > 0.0) & (thresholds > 0.0), line, np.nan)
         above = part > 0.5 * line
         joined = (
             above | np.append(False, above[:-1]) | np.append(above[1:], False)
         )  # no gaps between the two
         dashed = {"color": look["color"], "linestyle": look["linestyle"]}
-        panel.plot(wanted * 1000.0, np.where(above, np.nan, shown), **dashed)
+        panel.plot(displacements, np.where(above, np.nan, shown), **dashed)
         panel.plot(
-            wanted * 1000.0, np.where(joined, shown, np.nan), color=look["color"], linestyle=":"
+            displacements, np.where(joined, shown, np.nan), color=look["color"], linestyle=":"
         )
         handle = {**look, "linestyle": "none"} if marks.any() else dashed
-        (drawing.legend[name],) = panel.plot(wanted[marks] * 1000.0, shown[marks], **handle)
+        (drawing.legend[name],) = panel.plot(displacements[marks], shown[marks], **handle)
     for axis, (low, high) in ((panel.xaxis, panel.get_xlim()), (panel.yaxis, panel.get_ylim())):
         log_ticks(axis, high / low)
     if len(names) == 1:  # the caption has what the curve is of

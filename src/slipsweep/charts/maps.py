@@ -92,7 +92,7 @@ def contours(result: Result, options: Options) -> Figure:
         return _finish(sheet, name)
     logs = xr.apply_ufunc(np.log10, drawn.clip(min=levels[0]))
     growth = [logs.diff(dim) for dim in (sheet.x, str(sheet.y))]
-    if any((abs(one) > 1.0).sum() > _COARSE * (one != 0.0).sum() for one in growth):
+    if any((abs(steps) > 1.0).sum() > _COARSE * (steps != 0.0).sum() for steps in growth):
         sheet.note(
             "Coarse grid: values grow more than tenfold from cell to cell; read none between "
             "cells.",
@@ -100,8 +100,8 @@ def contours(result: Result, options: Options) -> Figure:
         )
     of_length = RESULTS[name].get("units") == "m"
     texts = [
-        style.length_text(one) if of_length else style.with_unit(f"{one:.3g}", style.unit(name))
-        for one in levels
+        style.length_text(level) if of_length else style.with_unit(f"{level:.3g}", style.unit(name))
+        for level in levels
     ]
     # what is below the lowest level, or nothing, is a hundredth of it; what does not slide is
     # covered later
@@ -148,15 +148,15 @@ def modes(result: Result, options: Options) -> Figure:
         ("theta", "yield_coefficient", "mu_s", "frequency"),
     )
     for panel in sheet.panels:
-        found = panel.grid("sliding_mode")
+        codes = panel.grid("sliding_mode")
         # continuous sliding and no sliding cover what they take of the rest
         margins = {
             SlidingMode.STUCK: (-regions.excess_over(panel, "yield_line"), _STUCK),
-            SlidingMode.STICK_SLIP: (np.ma.ones(found.shape), _VALUES),
+            SlidingMode.STICK_SLIP: (np.ma.ones(codes.shape), _VALUES),
             SlidingMode.CONTINUOUS: (regions.excess_over(panel, "limit_line"), _VALUES + 0.1),
         }
         for mode, (colour, hatch) in MODES.items():
-            if not (found == mode).any():
+            if not (codes == mode).any():
                 continue
             look = {"facecolor": colour, "edgecolor": "white" if hatch else "0.6", "hatch": hatch}
             _fill(sheet, panel, *margins[mode], style.MODE_TEXT[mode], look)
@@ -236,8 +236,13 @@ def _label_contours(panel: Panel, drawn: Any, texts: dict[float, str]) -> None:
     line_space = 0.11
     inches = panel.axes.transData + panel.axes.figure.dpi_scale_trans.inverted()
     corners = panel.axes.bbox.transformed(panel.axes.figure.dpi_scale_trans.inverted()).get_points()
-    thresholds: list[Any] = [one for one in panel.axes.collections if one.get_gid() in style.LINES]
-    segments: list[Any] = [*drawn.allsegs, *(some for one in thresholds for some in one.allsegs)]
+    thresholds: list[Any] = [
+        artist for artist in panel.axes.collections if artist.get_gid() in style.LINES
+    ]
+    segments: list[Any] = [
+        *drawn.allsegs,
+        *(some for artist in thresholds for some in artist.allsegs),
+    ]
     lines = [inches.transform(np.concatenate([*some, np.empty((0, 2))])) for some in segments]
     labels: list[Floats] = []
     for at, points in enumerate(lines[: len(drawn.levels)]):

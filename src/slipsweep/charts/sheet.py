@@ -217,15 +217,15 @@ def _without_colour(figure: Figure) -> None:
     """Replace all colours by their lightness, in maps by lighter greys, so that hatches show."""
     for artist in figure.findobj():
         if isinstance(artist, ScalarMappable) and artist.get_array() is not None:
-            given = artist.get_cmap()
-            if given.name == _GREY:  # of a chart that was drawn in other axes before
+            colour_map = artist.get_cmap()
+            if colour_map.name == _GREY:  # of a chart that was drawn in other axes before
                 continue
             # lines and areas of contours of one colour keep its lightness
             one_colour = getattr(artist, "colors", None) is not None
             to_grey = style.to_grey if one_colour else style.to_light_grey
-            ends = {"under": given.get_under(), "over": given.get_over()}
-            shades = ListedColormap(to_grey(given(np.arange(given.N))), _GREY)
-            extremes = {end: to_grey(one)[0] for end, one in ends.items()}
+            ends = {"under": colour_map.get_under(), "over": colour_map.get_over()}
+            shades = ListedColormap(to_grey(colour_map(np.arange(colour_map.N))), _GREY)
+            extremes = {end: to_grey(colour)[0] for end, colour in ends.items()}
             artist.set_cmap(shades.with_extremes(**extremes))
             continue
         for kind in ("color", "markerfacecolor", "markeredgecolor", "facecolor", "edgecolor"):
@@ -342,7 +342,7 @@ class Sheet(Drawing):
         validities = [*others, *([self.data["validity"]] if "validity" in self.data else [])]
         groups: dict[str, list[Validity]] = {}
         for flag in LEFT_OUT:
-            if any(has_flags(one, flag).any() for one in validities):
+            if any(has_flags(validity, flag).any() for validity in validities):
                 drawn = self.options.show_cautions and not (
                     name == DISPLACEMENT and flag == Validity.UPSLOPE
                 )
@@ -385,10 +385,10 @@ class Sheet(Drawing):
         self.data = self.data.merge(thresholds(self.data, always)).assign(drawn=drawn)
         if name != DISPLACEMENT or is_newmark(self.data):
             return
-        theirs = newmark_displacement(self.data)
-        if theirs is not None:
-            self.data["newmark"] = theirs.reset_coords(drop=True)
-            ratio = (drawn / theirs).where(lambda one: np.isfinite(one) & (one > 0))
+        of_newmark = newmark_displacement(self.data)
+        if of_newmark is not None:
+            self.data["newmark"] = of_newmark.reset_coords(drop=True)
+            ratio = (drawn / of_newmark).where(lambda values: np.isfinite(values) & (values > 0))
             if ratio.notnull().any():
                 low, middle, high = np.nanquantile(ratio, (0.05, 0.5, 0.95))
                 self.note(
@@ -397,7 +397,7 @@ class Sheet(Drawing):
                     f"90 % of the sliding cells shown lie between {low:.3g} and {high:.3g}.",
                     short="",
                 )
-        self.data["unsound"], trends = unsound(self.data, drawn, theirs)
+        self.data["unsound"], trends = unsound(self.data, drawn, of_newmark)
         if trends:
             share = percent(int(self.data["unsound"].sum()) / int((drawn > 0).sum()))
             self.note(
@@ -423,13 +423,13 @@ class Sheet(Drawing):
         if not self.options.is_brief:
             text += f"; {self.data.attrs.get('source', 'slipsweep')}"
         cases = []
-        own = [
+        of_cases = [
             name
             for name in style.SYMBOLS
             if name in self.data.coords and self.data[name].dims == ("case",)
         ]
         for at in range(self.data.sizes.get("case", 0)):
-            values = ", ".join(member_text(self.data, name, at, self.options) for name in own)
+            values = ", ".join(member_text(self.data, name, at, self.options) for name in of_cases)
             cases.append(f"{member_text(self.data, 'case', at, self.options)}: {values}.")
         return self.finish([text, *cases], beside)
 

@@ -73,7 +73,7 @@ class Result:
             self.variables = []
             self.dims = []
             return
-        self.variables = [str(one) for one in data.data_vars if one in SHOWN]
+        self.variables = [str(key) for key in data.data_vars if key in SHOWN]
         if not self.variables:
             raise InputError(f'{name}: not a result of "slipsweep run"')
         recorded = self.sort in ("record", "suite")
@@ -84,11 +84,11 @@ class Result:
         if 0 in data.sizes.values():
             raise InputError(f"{name}: holds no cells")
         check_attributes(data.attrs, self.name)
-        for key, one in data.variables.items():
+        for key, variable in data.variables.items():
             units = (SHOWN | PARAMETERS).get(str(key), {}).get("units")
-            if units and one.attrs.get("units", units) != units:
+            if units and variable.attrs.get("units", units) != units:
                 raise InputError(
-                    f'{name}: {key}: units = "{one.attrs["units"]}"; must be "{units}"'
+                    f'{name}: {key}: units = "{variable.attrs["units"]}"; must be "{units}"'
                 )
         self.dims = [str(dim) for dim in data.sizes]
         ordered = [dim for dim in self.dims if dim in PARAMETERS and dim != "polarity"]
@@ -194,8 +194,8 @@ class Result:
         cuts = self.places(at)
         exact = {}
         picked = {}
-        index: dict[str, Any] = {dim: one for dim, one in keep.items() if isinstance(one, slice)}
-        for dim in [one for one in self.dims if one not in index]:
+        index: dict[str, Any] = {dim: part for dim, part in keep.items() if isinstance(part, slice)}
+        for dim in [other for other in self.dims if other not in index]:
             middle = 0 if dim in NAMED else (self.data.sizes[dim] - 1) // 2
             if dim == "polarity":
                 middle = int(np.argmax(self.data[dim].values))
@@ -207,7 +207,8 @@ class Result:
             dims, shape = ((dim,), [len(chosen)]) if dim in keep else ((), [])
             index[dim] = np.reshape([place.index or 0 for place in chosen], shape)
             if any(place.index is None for place in chosen):
-                exact[dim] = dims, np.reshape([one.value for one in chosen], shape), PARAMETERS[dim]
+                values = np.reshape([place.value for place in chosen], shape)
+                exact[dim] = dims, values, PARAMETERS[dim]
             elif not dims and dim in NAMED and (labels := axis_labels(self.data, dim)):
                 picked[dim] = labels[chosen[0].index]
         there = [name for name in names if name in self.variables]
@@ -371,4 +372,5 @@ def _sort(data: xr.Dataset) -> str:
         return "statistics"
     if not is_recorded(data):
         return "sweep"
-    return "suite" if any("motion" in one.dims for one in data.data_vars.values()) else "record"
+    has_motions = any("motion" in variable.dims for variable in data.data_vars.values())
+    return "suite" if has_motions else "record"

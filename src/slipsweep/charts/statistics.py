@@ -12,6 +12,7 @@ from slipsweep.charts.slices import Result
 from slipsweep.charts.style import BLUE, VERMILION, Look, Options
 from slipsweep.errors import InputError
 from slipsweep.files.selection import axis_labels
+from slipsweep.model.units import in_mm
 from slipsweep.model.variables import PARAMETERS, STRENGTHS, SensitivityStatus
 from slipsweep.studies.solved_again import DRIVES
 
@@ -53,8 +54,8 @@ def draw_fragility(sheet: Sheet) -> Figure:
         if shares.any():
             dotted = panel.axes.plot(panel.xs, shares.max(axis=0), color="0.4", linestyle=":")
             sheet.legend["no value (share)"] = dotted[0]
-        given = f"{symbol} > d" if fixed is None or sheet.y is None else f"{symbol} > {fixed}"
-        panel.axes.set(ylim=(-0.02, 1.02), ylabel=f"probability of exceedance P({given})")
+        event = f"{symbol} > d" if fixed is None or sheet.y is None else f"{symbol} > {fixed}"
+        panel.axes.set(ylim=(-0.02, 1.02), ylabel=f"probability of exceedance P({event})")
     return sheet.done()
 
 
@@ -63,12 +64,12 @@ def quantiles(result: Result, options: Options) -> Figure:
     sheet = result.sheet(
         options, ["displacement_quantile", "valueless_share"], _AXES, keep=["quantile"]
     )
-    everything = sheet.data["displacement_quantile"].values * 1000.0
+    everything = in_mm(sheet.data["displacement_quantile"].values)
     shares = np.atleast_1d(sheet.data["quantile"].values)
     for panel in sheet.panels:
         label = f"{style.displacement_text(sheet.data.attrs)} (mm)"
         floor = log_axis(panel.axes, everything, label, zeros=True)
-        values = panel.grid("displacement_quantile", "quantile", panel.x) * 1000.0
+        values = in_mm(panel.grid("displacement_quantile", "quantile", panel.x))
         shown = np.maximum(values, floor)
         xs = panel.xs
         middle = shares.size // 2
@@ -99,7 +100,7 @@ def sensitivity(result: Result, options: Options) -> Figure:
             f"{result.name}: holds no Sobol indices; sensitivity = true in [uncertainty] computes "
             "them"
         )
-    names = [name for one in _INDICES for name in one[:2]] + ["sensitivity_status"]
+    names = [name for index in _INDICES for name in index[:2]] + ["sensitivity_status"]
     left = [
         dim for dim in result.wide if dim in PARAMETERS and dim in result.data["total_index"].dims
     ]
@@ -107,7 +108,9 @@ def sensitivity(result: Result, options: Options) -> Figure:
     sheet = result.sheet(options, names, "input" if bars else _AXES, keep=["bound", "input"])
     status = {*sheet.data["sensitivity_status"].values.flat}
     reasons = [
-        one.text for one in SensitivityStatus if one in status and one != SensitivityStatus.COMPUTED
+        code.text
+        for code in SensitivityStatus
+        if code in status and code != SensitivityStatus.COMPUTED
     ]
     if not np.isfinite(sheet.data["total_index"]).any():
         raise InputError(
@@ -117,7 +120,7 @@ def sensitivity(result: Result, options: Options) -> Figure:
         sheet.note(f"No indices where {text}.")
     inputs = axis_labels(sheet.data, "input")
     symbols = [
-        " + ".join(style.SYMBOLS.get(one, style.plain(one)) for one in name.split("+"))
+        " + ".join(style.SYMBOLS.get(part, style.plain(part)) for part in name.split("+"))
         for name in inputs
     ]
     if bars:

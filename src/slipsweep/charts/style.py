@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError
 from slipsweep.model import variables
 from slipsweep.model.options import MODELS
-from slipsweep.model.units import quantity
+from slipsweep.model.units import in_mm, quantity
 from slipsweep.model.variables import (
     INTENSITY_MEASURES,
     PARAMETERS,
@@ -157,15 +157,17 @@ class Options:
     inches: float | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
-        own = "m" if SHOWN.get(self.variable, {}).get("units") == "m" else "1"
-        found = {
-            quantity("levels", one, own, 1.0) if isinstance(one, str) else float(one)
-            for one in self.levels
+        unit_of_levels = "m" if SHOWN.get(self.variable, {}).get("units") == "m" else "1"
+        heights = {
+            quantity("levels", entry, unit_of_levels, 1.0)
+            if isinstance(entry, str)
+            else float(entry)
+            for entry in self.levels
         }
-        for level in found:
+        for level in heights:
             if not 0 < level < float("inf"):
                 raise InputError(f"levels: {level:g}: must be > 0")
-        self.heights = sorted(found)
+        self.heights = sorted(heights)
         self.equations = check_equations(self.equations)
         if self.magnitude is not None and not self.equations:
             raise InputError(f"magnitude = {self.magnitude}: only with equations")
@@ -273,7 +275,7 @@ def with_unit(text: str, units: str) -> str:
 
 def length_text(metres: float) -> str:
     """Return a displacement with its unit: ``30 mm``, ``2 m``."""
-    return f"{metres * 1000:.4g} mm" if metres < 0.9999 else f"{metres:.4g} m"
+    return f"{in_mm(metres):.4g} mm" if metres < 0.9999 else f"{metres:.4g} m"
 
 
 def value_text(data: xr.Dataset, name: str, value: float, options: Options) -> str:
@@ -369,11 +371,16 @@ def drawn_text(attributes: Mapping[Any, Any]) -> str:
         return ""
     signs = {"absolute": "~", "factor": "×", "offset": "+"}
     texts = []
-    for name, given in json.loads(attributes["uncertain"]).items():
+    for name, distribution in json.loads(attributes["uncertain"]).items():
         numbers = ", ".join(
-            f"{key}={value}" for key, value in given.items() if key not in ("distribution", "kind")
+            f"{key}={value}"
+            for key, value in distribution.items()
+            if key not in ("distribution", "kind")
         )
-        texts.append(f"{SYMBOLS[name]} {signs[given['kind']]} {given['distribution']}({numbers})")
+        texts.append(
+            f"{SYMBOLS[name]} {signs[distribution['kind']]} "
+            f"{distribution['distribution']}({numbers})"
+        )
     pooled = f"{plain(attributes['pooled'])} x " if "pooled" in attributes else ""
     return f"{', '.join(texts)}; {pooled}{attributes.get('samples', '?')} samples"
 

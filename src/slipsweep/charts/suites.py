@@ -18,6 +18,7 @@ from slipsweep.charts.sheet import Panel, Sheet, log_axis, log_ticks, plot_curve
 from slipsweep.charts.slices import Result
 from slipsweep.charts.style import Floats, Look, Options
 from slipsweep.errors import InputError
+from slipsweep.model.units import in_mm
 from slipsweep.model.variables import CAUTIONS, INTENSITY_MEASURES, STRENGTHS
 from slipsweep.studies.boundaries import has_flags
 from slipsweep.studies.cautions import percent, reliable
@@ -58,13 +59,12 @@ def motions(result: Result, options: Options) -> Figure:
         sheet.data["drawn"] = sheet.data[DISPLACEMENT]
     for panel in sheet.panels:
         floor = log_axis(panel.axes, _displacements(sheet.data), _label(sheet), zeros=True)
-        lines = (
-            panel.data["drawn"].transpose(*SUITE, panel.x, missing_dims="ignore").values * 1000.0
-        )
+        drawn = panel.data["drawn"].transpose(*SUITE, panel.x, missing_dims="ignore")
+        lines = in_mm(drawn.values)
         draw_suite(sheet, panel.axes, panel.xs, lines, _band(panel.data, panel.x), floor)
         if "newmark_displacement" in panel.data:
-            theirs = panel.data.assign({DISPLACEMENT: panel.data["newmark_displacement"]})
-            median = np.maximum(_band(theirs, panel.x)[1], floor)
+            of_newmark = panel.data.assign({DISPLACEMENT: panel.data["newmark_displacement"]})
+            median = np.maximum(_band(of_newmark, panel.x)[1], floor)
             sheet.legend[f"median, {style.NEWMARK}"] = panel.axes.plot(
                 panel.xs, median, gid="newmark", **_NEWMARK
             )[0]
@@ -104,8 +104,8 @@ def intensity(result: Result, options: Options) -> Figure:
         }
         for name, (which, heights, look) in marks.items():
             if which.any():
-                own: Look = {"gid": name, "linestyle": "", **look}
-                (sheet.legend[name],) = panel.axes.plot(xs[which], heights[which], **own)
+                point: Look = {"gid": name, "linestyle": "", **look}
+                (sheet.legend[name],) = panel.axes.plot(xs[which], heights[which], **point)
         _draw_regression(sheet, panel, xs, ys)
         equations.draw_over_measure(sheet, panel, measure, xs)
     left_out = _sliding_left_out(sheet)
@@ -147,8 +147,8 @@ def histogram(result: Result, options: Options) -> Figure:
         axes.set(xscale="log", xlabel=_label(sheet), ylabel="number of motions")
         log_ticks(axes.xaxis, edges[-1] / edges[0])
         axes.yaxis.set_major_locator(MaxNLocator(integer=True))
-        found = suite_statistics(panel.data)
-        low, median, high = found["displacement_quantile"].values.ravel() * 1000.0
+        statistics_of_panel = suite_statistics(panel.data)
+        low, median, high = in_mm(statistics_of_panel["displacement_quantile"].values.ravel())
         edge = "16 and 84 %"
         for place, look, text in (
             (median, _MEDIAN, "median"),
@@ -157,7 +157,7 @@ def histogram(result: Result, options: Options) -> Figure:
         ):
             if place > 0:
                 sheet.legend[text] = axes.axvline(place, gid=text, **look)
-        panel.add_title(f"zero displacement: {found['zero_probability'].item():.0%}")
+        panel.add_title(f"zero displacement: {statistics_of_panel['zero_probability'].item():.0%}")
     _note_suite(sheet, "Median and 16 to 84 % are of", "no bar shows them")
     _note_cautions(sheet)
     return sheet.done()
@@ -166,10 +166,10 @@ def histogram(result: Result, options: Options) -> Figure:
 def fragility(result: Result, options: Options) -> Figure:
     """Draw the share of the motions of a suite that exceed a displacement, over one axis."""
     sheet = _sheet(result, options)
-    found = suite_statistics(sheet.data, thresholds=options.heights or THRESHOLDS)
+    shares = suite_statistics(sheet.data, thresholds=options.heights or THRESHOLDS)
     _note_suite(sheet, "P is the share of")
     _note_cautions(sheet)
-    drawn = Sheet(found, sheet.x, "threshold", options, sheet.along)
+    drawn = Sheet(shares, sheet.x, "threshold", options, sheet.along)
     drawn.notes = sheet.notes
     drawn.set_axis("x")
     return statistics.draw_fragility(drawn)
@@ -185,10 +185,10 @@ def _sheet(
         if dim not in SUITE
     ]
     sheet = result.sheet(options, [*result.compared(DISPLACEMENT), *more], x or axes, keep=SUITE)
-    given = sheet.data[DISPLACEMENT]
+    displacement = sheet.data[DISPLACEMENT]
     rounded = without_rounding(sheet.data[DISPLACEMENT])
     sheet.data[DISPLACEMENT] = rounded
-    if not rounded.equals(given):
+    if not rounded.equals(displacement):
         sheet.note("Displacements below 10⁻¹² m count as zero.")
     return sheet
 
@@ -228,10 +228,8 @@ def suite_text(sizes: Mapping[Hashable, int]) -> str:
 
 def _band(data: xr.Dataset, x: str) -> Floats:
     """Return the suite's quantiles along an axis, mm."""
-    return (
-        np.asarray(suite_statistics(data)["displacement_quantile"].transpose("quantile", x))
-        * 1000.0
-    )
+    quantiles = suite_statistics(data)["displacement_quantile"].transpose("quantile", x)
+    return np.asarray(in_mm(quantiles))
 
 
 def _label(sheet: Sheet) -> str:
@@ -241,7 +239,7 @@ def _label(sheet: Sheet) -> str:
 
 def _displacements(data: xr.Dataset) -> Floats:
     """Return all displacements that have a value, mm."""
-    values = data[DISPLACEMENT].values.ravel() * 1000.0
+    values = in_mm(data[DISPLACEMENT].values.ravel())
     return np.asarray(values[np.isfinite(values)], np.float64)
 
 
@@ -255,8 +253,8 @@ def _scattered(panel: Panel, measure: str) -> Floats:
     factor = np.abs(data["scale"] if "scale" in data.coords else data["motion_factor"])
     time = data["time_scale"] if "time_scale" in data.coords else 1.0
     xs = data[f"motion_{measure}"] * factor**power * time**time_power
-    ys = reliable(data, DISPLACEMENT, panel.options.show_cautions) * 1000.0
-    every = np.array([one.values.ravel() for one in xr.broadcast(xs, ys, data["polarity"])])
+    ys = in_mm(reliable(data, DISPLACEMENT, panel.options.show_cautions))
+    every = np.array([array.values.ravel() for array in xr.broadcast(xs, ys, data["polarity"])])
     return every[:, np.isfinite(every[1])]
 
 
@@ -275,21 +273,21 @@ def _draw_regression(sheet: Sheet, panel: Panel, xs: Floats, ys: Floats) -> None
     elif np.ptp(np.log(xs[slid])) < 1e-6:  # motions scaled to it
         panel.add_title("no regression: one value for all motions")
     else:
-        found: Any = scipy.stats.linregress(np.log(xs[slid]), np.log(ys[slid]))
-        scatter = found.stderr * np.std(np.log(xs[slid])) * np.sqrt(slid.sum())
+        fit: Any = scipy.stats.linregress(np.log(xs[slid]), np.log(ys[slid]))
+        scatter = fit.stderr * np.std(np.log(xs[slid])) * np.sqrt(slid.sum())
         ends = np.geomspace(xs[slid].min(), xs[slid].max(), 50)
-        line = np.exp(found.intercept) * ends**found.slope
+        line = np.exp(fit.intercept) * ends**fit.slope
         look: Look = {"color": "0.2", "linewidth": 1.2, "linestyle": (0, (6, 2))}
         sheet.remarks["regression"] = panel.axes.plot(ends, line, gid="regression", **look)[0]
-        panel.add_title(f"slope {found.slope:.2f}, R² = {found.rvalue**2:.2f}, σ = {scatter:.2f}")
+        panel.add_title(f"slope {fit.slope:.2f}, R² = {fit.rvalue**2:.2f}, σ = {scatter:.2f}")
 
 
 def _note_suite(sheet: Sheet, what: str, zeros_are: str = "") -> None:
     """Add to the caption the numbers of motions, of those without a value, and of zeros."""
-    found = suite_statistics(sheet.data)
-    missing = found["valueless_count"]
-    reasons = found["valueless_flag_count"]
-    total = int((found["value_count"] + missing).max())
+    counts = suite_statistics(sheet.data)
+    missing = counts["valueless_count"]
+    reasons = counts["valueless_flag_count"]
+    total = int((counts["value_count"] + missing).max())
     most = int(missing.max())
     up_to = "" if missing.size == 1 else "up to "
     flags = zip(reasons["flag"].values, reasons.max(missing.dims).values, strict=True)
@@ -300,9 +298,9 @@ def _note_suite(sheet: Sheet, what: str, zeros_are: str = "") -> None:
         else "all have a value"
     )
     sheet.note(f"{what} {suite_text(sheet.data[DISPLACEMENT].sizes)}; {left}.")
-    zeros = (found["zero_probability"].fillna(0.0) * found["value_count"]).values
+    zeros = (counts["zero_probability"].fillna(0.0) * counts["value_count"]).values
     if zeros_are and zeros.max() > 0:
-        count = found["value_count"].values.flat[np.argmax(zeros)]
+        count = counts["value_count"].values.flat[np.argmax(zeros)]
         shown = f"Zero displacement: {up_to}{round(zeros.max())} of {count}"
         sheet.note(f"{shown}; {zeros_are}.", f"{shown}.")
 

@@ -16,6 +16,7 @@ import xarray as xr
 
 from slipsweep.errors import InputError, RunError
 from slipsweep.model.parameters import shown
+from slipsweep.model.units import in_mm
 from slipsweep.model.variables import (
     HAZARD_RESULTS,
     PARAMETERS,
@@ -125,7 +126,7 @@ def openquake_fragility(shares: xr.Dataset) -> str:
         raise InputError(
             "no value under any motion or sample at some amplitudes: cut the axis amplitude"
         )
-    states = [f"u_above_{d * 1000.0:.6g}_mm" for d in shares["threshold"].values]
+    states = [f"u_above_{in_mm(d):.6g}_mm" for d in shares["threshold"].values]
     grid = {
         dim: size
         for dim, size in probability.sizes.items()

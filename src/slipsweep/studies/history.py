@@ -184,9 +184,9 @@ class _History:
         self.problem = problem
         self.inputs = inputs
         self.summary = summary
-        given = engine.cell_inputs(problem, inputs)
+        cell = engine.cell_inputs(problem, inputs)
         motion = problem.excitation
-        self.fields = {name: float(value) for name, value in given.items()}
+        self.fields = {name: float(value) for name, value in cell.items()}
         self.options = solvers.options_of(problem, wants_peak=True)
         self.record = motion if isinstance(motion, Record) else None
         if self.record is not None:
@@ -243,24 +243,24 @@ class _History:
 
     def columns(self, phases: Floats) -> dict[str, xr.Variable]:
         """Return the variables of a history."""
-        found = dict(zip(HISTORY, self.sampled(phases), strict=True))
+        series = dict(zip(HISTORY, self.sampled(phases), strict=True))
         if "mu_s" not in self.inputs:  # Eq. 1 needs θ and μs
-            del found["friction_coefficient"]
+            del series["friction_coefficient"]
         with np.errstate(over="ignore"):
-            found["relative_velocity"] *= self.unit
-            found["relative_displacement"] *= self.unit * self.unit
-        if not self.valueless and not all(np.isfinite(values).all() for values in found.values()):
-            given = ", ".join(
-                f"{name} = {parameters.number_text(float(one))}"
-                for name, one in self.inputs.items()
+            series["relative_velocity"] *= self.unit
+            series["relative_displacement"] *= self.unit * self.unit
+        if not self.valueless and not all(np.isfinite(values).all() for values in series.values()):
+            inputs_text = ", ".join(
+                f"{name} = {parameters.number_text(float(value))}"
+                for name, value in self.inputs.items()
             )
             raise InputError(
-                f"{given}: the history is then no finite number in double precision; must be "
+                f"{inputs_text}: the history is then no finite number in double precision; must be "
                 "nearer to 1"
             )
         return {
             name: xr.Variable(("time",), values.copy(), HISTORY[name])
-            for name, values in found.items()
+            for name, values in series.items()
         }
 
     def half_waves(self) -> dict[str, xr.Variable]:
@@ -272,14 +272,15 @@ class _History:
             return {}
         with np.errstate(over="ignore"):
             peak = self.path.intervals["height"] * self.fields["amplitude"]
-        given = {**self.inputs, "amplitude": xr.Variable("half_wave", peak)}
-        request = engine.Request(self.problem, {"half_wave": peak.size}, given, ("sliding_mode",))
+        of_half_waves = {**self.inputs, "amplitude": xr.Variable("half_wave", peak)}
+        sizes = {"half_wave": peak.size}
+        request = engine.Request(self.problem, sizes, of_half_waves, ("sliding_mode",))
         mode = engine.friction_parameters(request)["sliding_mode"].values
         if self.valueless:
             mode[:] = variables.SlidingMode.MISSING
         first = self.path.intervals["first"]
         after = self.path.intervals["end"]
-        found = {
+        series = {
             "half_wave_start": self.unit * self.path.base.pieces["start"][first],
             "half_wave_end": self.unit * self.path.base.pieces["end"][after - 1],
             "half_wave_peak": peak,
@@ -287,7 +288,7 @@ class _History:
         }
         return {
             name: xr.Variable(("half_wave",), values, variables.HALF_WAVES[name])
-            for name, values in found.items()
+            for name, values in series.items()
         }
 
     def points(self, points_per_cycle: int) -> Floats:

@@ -210,7 +210,9 @@ def plan_limits(
     highest = parameters.check_single("maximum_amplitude", maximum_amplitude)
     solved = dict(request.inputs)
     solved["displacement"] = solved.pop("amplitude")
-    blocks = grid_sizes({name: one for name, one in solved.items() if name not in _AFTER_SCAN})
+    blocks = grid_sizes(
+        {name: variable for name, variable in solved.items() if name not in _AFTER_SCAN}
+    )
     scaled = {dim: size for dim, size in plan.sizes.items() if dim not in blocks}
     # the sliding mode, or under a record the numbers of pulses
     codes = variables.RECORD_COUNTS if "time_scale" in solved else ("sliding_mode",)
@@ -219,7 +221,7 @@ def plan_limits(
     request = replace(request, inputs=solved, wanted=names)
     return replace(
         plan,
-        coords={name: one for name, one in plan.coords.items() if name != "amplitude"}
+        coords={name: variable for name, variable in plan.coords.items() if name != "amplitude"}
         | {"displacement": target},
         tasks=((partial(_solve, highest, steps), request),),
         names=names,
@@ -283,14 +285,14 @@ def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> dict[
     """Return the limit amplitudes of a part of a grid that one motion shakes."""
     scan = Scan(request, maximum_amplitude, steps)
     cell, low, high = _limits(scan)
-    wanted = tuple(name for name in request.wanted if not name.startswith("limit_"))
-    before = scan.solve(low, cell, wanted)
-    after = scan.solve(high, cell, wanted)
-    results = {name: one.data.ravel() for name, one in request.results().items()}
+    names = tuple(name for name in request.wanted if not name.startswith("limit_"))
+    before = scan.solve(low, cell, names)
+    after = scan.solve(high, cell, names)
+    results = {name: variable.data.ravel() for name, variable in request.results().items()}
     for values in results.values():
         values[:] = math.nan if values.dtype.kind == "f" else variables.SlidingMode.MISSING
     # without a limit the validity at the maximum amplitude says why
-    results["validity"][:] = scan.found["validity"][:, -1]
+    results["validity"][:] = scan.results["validity"][:, -1]
     valueless = np.isnan(scan.displacements).all(axis=1)
     results["limit_status"][:] = np.where(valueless, LimitStatus.INVALID, LimitStatus.NOT_REACHED)
     for name, values in {**after, "limit_amplitude": high}.items():
@@ -325,38 +327,41 @@ class Scan:
         every = inputs | {"amplitude": amplitudes}
         slips = ("number_of_slips",) if isinstance(self.problem.excitation, Record) else ()
         self.moved = limited_displacement.results_of(self.problem.model)
-        wanted = (*self.moved, "validity", *slips)
-        found = engine.solve(Request(self.problem, grid_sizes(every), every, wanted))
+        names = (*self.moved, "validity", *slips)
+        results = engine.solve(Request(self.problem, grid_sizes(every), every, names))
         full = {**request.sizes, _ALONG: amplitudes.sizes[_ALONG]}
         #: Results and amplitudes, (cell, amplitude).
-        self.found = {
-            name: one.set_dims(full).values.reshape(-1, full[_ALONG])
-            for name, one in (*found.items(), ("amplitude", amplitudes))
+        self.results = {
+            name: variable.set_dims(full).values.reshape(-1, full[_ALONG])
+            for name, variable in (*results.items(), ("amplitude", amplitudes))
         }
-        self.amplitudes = self.found["amplitude"]
+        self.amplitudes = self.results["amplitude"]
         #: Displacements that are compared with those to be reached, (cell, amplitude).
-        self.displacements = limited_displacement.displacement_of(self.found)
+        self.displacements = limited_displacement.displacement_of(self.results)
         #: Displacements to be reached, (cell,).
         self.targets = displacement.set_dims(request.sizes).values.ravel()
         #: Inputs but for the amplitude: one value for each cell, or one for all.
         self.inputs = {
-            name: xr.Variable("cell", one.set_dims(request.sizes).values.ravel())
-            if one.dims
-            else one
-            for name, one in inputs.items()
+            name: xr.Variable("cell", variable.set_dims(request.sizes).values.ravel())
+            if variable.dims
+            else variable
+            for name, variable in inputs.items()
         }
 
     def solve(
-        self, amplitude: Floats, cell: Indices, wanted: tuple[str, ...]
+        self, amplitude: Floats, cell: Indices, names: tuple[str, ...]
     ) -> dict[str, NDArray[Any]]:
         """Return results of some cells, each at its own amplitudes (a row of the array)."""
         dims = ("cell", _ALONG)[: amplitude.ndim]
-        inputs = {name: one[cell] if one.dims else one for name, one in self.inputs.items()}
+        inputs = {
+            name: variable[cell] if variable.dims else variable
+            for name, variable in self.inputs.items()
+        }
         inputs["amplitude"] = xr.Variable(dims, amplitude)
-        found = engine.solve(
-            Request(self.problem, dict(zip(dims, amplitude.shape, strict=True)), inputs, wanted)
+        results = engine.solve(
+            Request(self.problem, dict(zip(dims, amplitude.shape, strict=True)), inputs, names)
         )
-        return {name: one.values for name, one in found.items()}
+        return {name: variable.values for name, variable in results.items()}
 
     def reach(self, amplitude: Floats, cell: Indices) -> NDArray[np.bool_]:
         """Return True where cells reach their targets at amplitudes of their own."""
@@ -371,20 +376,22 @@ def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) 
     than the target and the time scale varies.
     """
     problem = request.problem
-    blocks = {name: one for name, one in request.inputs.items() if name not in _AFTER_SCAN}
+    blocks = {
+        name: variable for name, variable in request.inputs.items() if name not in _AFTER_SCAN
+    }
     sizes = {dim: size for dim, size in request.sizes.items() if dim in grid_sizes(blocks)}
     # Newmark's block has no limiting acceleration, and may have no θ and μs that one would follow
     # from
     limited = ("limiting_acceleration",) if not isinstance(problem.model, options.Newmark) else ()
-    wanted = ("yield_acceleration", *limited)
+    names = ("yield_acceleration", *limited)
     blocks["amplitude"] = xr.Variable((), 0.0)
-    found = engine.friction_parameters(Request(problem, sizes, blocks, wanted))
+    accelerations = engine.friction_parameters(Request(problem, sizes, blocks, names))
     # a pulse begins to count, or changes its mode, where its own peak passes Üy or Üg,lim, which do
     # not depend on A
-    thresholds = np.stack([found[name].values.ravel() for name in wanted], axis=1)
+    thresholds = np.stack([accelerations[name].values.ravel() for name in names], axis=1)
     yields = thresholds[:, :1]
     if options.slides_both_ways(problem.model):
-        arrays = {name: one.set_dims(sizes).values for name, one in blocks.items()}
+        arrays = {name: variable.set_dims(sizes).values for name, variable in blocks.items()}
         upslope = engine.cell_inputs(problem, arrays)["upslope_yield_acceleration"]
         lowest = np.minimum(yields, np.broadcast_to(upslope, [*sizes.values()]).reshape(-1, 1))
         yields = np.where(yields > 0.0, lowest, yields)
@@ -432,17 +439,17 @@ def _limits(scan: Scan) -> Steps:
     # the scan begins at yield, where no block has moved: there is always a step before
     before = ~reached[:, :-1]
     cell, step = np.nonzero(before & reached[:, 1:])
-    found = [
+    steps = [
         (cell, scan.amplitudes[cell, step], scan.amplitudes[cell, step + 1]),
         *_hidden_peaks(scan, before),
     ]
     # the literal rise has a gap where Kd is negative: at its edges Kd is 0, and u infinite
-    found.append(_at_change(scan, before, "validity", bits=Validity.KD_NOT_POSITIVE.value))
+    steps.append(_at_change(scan, before, "validity", bits=Validity.KD_NOT_POSITIVE.value))
     if (
-        "number_of_slips" in scan.found
+        "number_of_slips" in scan.results
     ):  # where it changes, u jumps; under a waveform such jumps are hidden peaks
-        found.append(_at_change(scan, before, "number_of_slips", least=0.25, part=1e-5))
-    cells, low, high = (np.concatenate(values) for values in zip(*found, strict=True))
+        steps.append(_at_change(scan, before, "number_of_slips", least=0.25, part=1e-5))
+    cells, low, high = (np.concatenate(values) for values in zip(*steps, strict=True))
     order = np.argsort(high, kind="stable")
     cell, at = np.unique(cells[order], return_index=True)
     lowest = order[at]
@@ -460,7 +467,7 @@ def _hidden_peaks(scan: Scan, before: NDArray[np.bool_]) -> Iterator[Steps]:
     # and then falls
     saw, parts = (0.7, 128) if isinstance(scan.problem.excitation, Record) else (0.5, 512)
     moved = scan.displacements
-    slides_on = scan.found["validity"] & Validity.NOT_RECOUPLED.value != 0
+    slides_on = scan.results["validity"] & Validity.NOT_RECOUPLED.value != 0
     # the part of a target from which on a point may lie next to a peak, and a maximum of the scan
     # to a higher one
     least = np.where(slides_on, saw, np.inf)
@@ -469,15 +476,15 @@ def _hidden_peaks(scan: Scan, before: NDArray[np.bool_]) -> Iterator[Steps]:
     near = moved >= least * scan.targets[:, np.newaxis]
     cell, step = np.nonzero((near[:, 1:] | near[:, :-1]) & before)
     for chunk in grid_chunks({"cell": cell.size}, SCANNED // parts):
-        own = cell[chunk["cell"]]
+        cells = cell[chunk["cell"]]
         begin = step[chunk["cell"]]
         amplitudes = np.linspace(
-            scan.amplitudes[own, begin], scan.amplitudes[own, begin + 1], parts + 1, axis=1
+            scan.amplitudes[cells, begin], scan.amplitudes[cells, begin + 1], parts + 1, axis=1
         )
-        reaches = scan.reach(amplitudes, own)
+        reaches = scan.reach(amplitudes, cells)
         (which,) = np.nonzero(reaches.any(axis=1) & ~reaches[:, 0])
         first = reaches[which].argmax(axis=1)
-        yield own[which], amplitudes[which, first - 1], amplitudes[which, first]
+        yield cells[which], amplitudes[which, first - 1], amplitudes[which, first]
 
 
 def _at_change(
@@ -495,7 +502,7 @@ def _at_change(
     the part `least` of the target.
     """
     moved = scan.displacements
-    states = scan.found[result] & bits
+    states = scan.results[result] & bits
     cell, step = np.nonzero(states[:, 1:] != states[:, :-1])
     higher = np.maximum(moved[cell, step + 1], moved[cell, step])
     # a gap is NaN, and no comparison with NaN is true: its edges are located, too

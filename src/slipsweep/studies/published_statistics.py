@@ -11,6 +11,7 @@ import xarray as xr
 from slipsweep.errors import InputError
 from slipsweep.model.options import Mendez
 from slipsweep.model.parameters import check_numbers, number_text, shown
+from slipsweep.model.units import in_mm
 from slipsweep.model.variables import (
     PUBLISHED_RESULTS,
     STATISTIC_COORDINATES,
@@ -121,7 +122,7 @@ def published_statistics(
     each = estimates(result, names, magnitude)
     parts = []
     for estimate in each.values():
-        found = xr.Dataset(
+        statistics = xr.Dataset(
             {
                 "zero_probability": estimate.zero_probability,
                 "nonzero_median": estimate.median,
@@ -131,8 +132,8 @@ def published_statistics(
                 "exceedance_probability": _with(estimate, estimate.exceedance_probability, limits),
             }
         )
-        parts.append(found)
-    grid = [dim for dim in result.dims if any(dim in one["in_range"].dims for one in parts)]
+        parts.append(statistics)
+    grid = [dim for dim in result.dims if any(dim in part["in_range"].dims for part in parts)]
     dataset = xr.concat(xr.broadcast(*parts, exclude=("threshold", "quantile")), "equation")
     dataset = dataset.transpose("equation", *grid, ...)
     dataset["in_range"] = dataset["in_range"].astype(np.int8)
@@ -140,11 +141,11 @@ def published_statistics(
         dataset[name].attrs = SUITE_STATISTICS[name]
     dataset["in_range"].attrs = PUBLISHED_RESULTS["in_range"]
     coords = {
-        name: one.variable
-        for name, one in result.coords.items()
-        if {*one.dims} <= {*grid} and name not in SUITE
+        name: coordinate.variable
+        for name, coordinate in result.coords.items()
+        if {*coordinate.dims} <= {*grid} and name not in SUITE
     }
-    own = {
+    statistic_coords = {
         dim: xr.Variable(dim, values.values, STATISTIC_COORDINATES[dim])
         for dim, values in (("threshold", limits), ("quantile", shares))
     }
@@ -152,7 +153,7 @@ def published_statistics(
     attrs = {**result.attrs, "title": TITLE, "conditions": "\n".join(conditions_texts(names))}
     if magnitude is not None:
         attrs["magnitude"] = float(magnitude)
-    return dataset.assign_coords(coords | own | labels).assign_attrs(attrs)
+    return dataset.assign_coords(coords | statistic_coords | labels).assign_attrs(attrs)
 
 
 def estimates(
@@ -162,7 +163,7 @@ def estimates(
 
     They are DataArrays along the dimensions of the inputs.
     """
-    found = {}
+    by_name = {}
     for name in names:
         equation = EQUATIONS[name]
         available = {} if magnitude is None else {"magnitude": _magnitude(magnitude)}
@@ -177,13 +178,13 @@ def estimates(
                 raise InputError(f"{name}: needs {INPUTS[needed]} ({needed}): {hint}")
         broadcast = xr.broadcast(*arrays.values())
         values: dict[str, Any] = {
-            needed: one.values for needed, one in zip(arrays, broadcast, strict=True)
+            needed: array.values for needed, array in zip(arrays, broadcast, strict=True)
         }
         if "g" in inspect.signature(equation.function).parameters:
             values["g"] = float(result.attrs["g"])
         estimate = equation.function(**values)
-        found[name] = Estimate(*(xr.DataArray(one, dims=broadcast[0].dims) for one in estimate))
-    return found
+        by_name[name] = Estimate(*(xr.DataArray(part, dims=broadcast[0].dims) for part in estimate))
+    return by_name
 
 
 def conditions_texts(names: Sequence[str]) -> list[str]:
@@ -213,12 +214,15 @@ def published_table(
 
     names = check_equations(equations)
     limits = [] if thresholds is None else thresholds
-    found = published_statistics(result, names, magnitude=magnitude, thresholds=limits or 0.0)
-    sources = {EQUATIONS[name].label: found.sel(equation=name) for name in names}
+    by_equations = published_statistics(
+        result, names, magnitude=magnitude, thresholds=limits or 0.0
+    )
+    sources = {EQUATIONS[name].label: by_equations.sel(equation=name) for name in names}
     if result.sizes.get("motion", 1) > 1:
-        own = suite_statistics(result, thresholds=limits or 0.0)
-        sources = {"this suite": own.assign(in_range=xr.ones_like(own["value_count"]))} | sources
-    parts = [_columns(one, bool(limits)) for one in sources.values()]
+        of_suite = suite_statistics(result, thresholds=limits or 0.0)
+        of_suite = of_suite.assign(in_range=xr.ones_like(of_suite["value_count"]))
+        sources = {"this suite": of_suite} | sources
+    parts = [_columns(source, bool(limits)) for source in sources.values()]
     whole = xr.concat(parts, pd.Index([*sources], name="displacement of"))
     # in the order of the result, without axes of one value
     axes = [str(dim) for dim in result.dims if whole.sizes.get(dim, 1) > 1]
@@ -231,18 +235,18 @@ def published_table(
     return table.rename(columns={dim: axis_title(result, dim) for dim in axes})
 
 
-def _columns(found: xr.Dataset, exceeded: bool) -> xr.Dataset:
+def _columns(statistics: xr.Dataset, exceeded: bool) -> xr.Dataset:
     """Return quantiles in mm and probabilities by the titles of a table."""
     columns: dict[str, xr.DataArray] = {}
-    for share in found["quantile"].values:
+    for share in statistics["quantile"].values:
         title = "median (mm)" if share == 0.5 else f"{100.0 * share:.3g} % (mm)"
-        quantile = found["displacement_quantile"].sel(quantile=share, drop=True)
-        columns[title] = 1000.0 * quantile
-    columns["zero"] = found["zero_probability"]
-    for limit in found["threshold"].values if exceeded else ():
-        title = f"P(u > {1000.0 * limit:.6g} mm)"
-        columns[title] = found["exceedance_probability"].sel(threshold=limit, drop=True)
-    columns["range"] = found["in_range"]
+        quantile = statistics["displacement_quantile"].sel(quantile=share, drop=True)
+        columns[title] = in_mm(quantile)
+    columns["zero"] = statistics["zero_probability"]
+    for limit in statistics["threshold"].values if exceeded else ():
+        title = f"P(u > {in_mm(limit):.6g} mm)"
+        columns[title] = statistics["exceedance_probability"].sel(threshold=limit, drop=True)
+    columns["range"] = statistics["in_range"]
     return xr.Dataset(columns).reset_coords(drop=True)
 
 
@@ -255,8 +259,8 @@ def published_lines(
 ) -> list[str]:
     """Return the table of `published_table` in lines, and the conditions of the equations."""
     names = check_equations(equations)
-    found = published_statistics(result, names, magnitude=magnitude)
-    points = found["in_range"].isel(equation=0).size
+    by_equations = published_statistics(result, names, magnitude=magnitude)
+    points = by_equations["in_range"].isel(equation=0).size
     if points > most:
         how = "--at NAME=VALUE takes those of some"
         return [f"published equations at {points} grid points: {how}"]
@@ -264,7 +268,7 @@ def published_lines(
     for title in table.select_dtypes("float"):
         is_share = title == "zero" or title.startswith("P(")
         as_text = ".1%" if is_share else ".3g" if title.endswith("(mm)") else ".4g"
-        table[title] = [_number(one, as_text) for one in table[title]]
+        table[title] = [_number(value, as_text) for value in table[title]]
     if not table["range"].any():
         table = table.drop(columns="range")
     outside = (
@@ -286,7 +290,7 @@ def axis_labels_of(result: xr.Dataset, dim: str) -> list[Any]:
     """Return places along an axis: numbers, peak ground accelerations in g, or labels."""
     if dim in result.variables and result[dim].dtype.kind in "iuf":
         factor = float(result.attrs["g"]) if dim == "amplitude" else 1.0
-        return [float(one) / factor for one in result[dim].values]
+        return [float(value) / factor for value in result[dim].values]
     return labels_along(result, dim)
 
 
@@ -299,7 +303,7 @@ def axis_title(result: xr.Dataset, dim: str) -> str:
 
 def _with(estimate: Estimate, method: Callable[[Any], Any], more: xr.DataArray) -> xr.DataArray:
     """Return a method of an estimate at several values, along their own dimension."""
-    values = np.stack([method(float(one)) for one in more.values], axis=-1)
+    values = np.stack([method(float(value)) for value in more.values], axis=-1)
     return xr.DataArray(values, dims=(*estimate.median.dims, *more.dims))
 
 
@@ -326,19 +330,19 @@ def _yield_coefficient(result: xr.Dataset) -> xr.DataArray | None:
     """Return Üy/g, NaN where the block slides under its own weight."""
     g = float(result.attrs["g"])
     if "yield_coefficient" in result.coords:
-        found = result["yield_coefficient"]
+        coefficient = result["yield_coefficient"]
     elif "yield_acceleration" in result.coords:
-        found = result["yield_acceleration"] / g
+        coefficient = result["yield_acceleration"] / g
     elif {"theta", "mu_s"} <= {*result.coords}:
         block = {name: result[name].reset_coords(drop=True) for name in ("theta", "mu_s")}
         # neither the amplitude nor the friction law enters Coulomb's yield acceleration
         coulomb = friction_parameters(
             **block, amplitude=0.0, delta_mu=0.0, decay_rate=0.0, model=Mendez(g=g)
         )
-        found = coulomb["yield_acceleration"] / g
+        coefficient = coulomb["yield_acceleration"] / g
     else:
         return None
-    return found.where(found > 0.0)
+    return coefficient.where(coefficient > 0.0)
 
 
 def peak_acceleration_in_g(result: xr.Dataset) -> xr.DataArray | None:

@@ -107,7 +107,7 @@ def _solve_part(part: Request) -> tuple[Floats, NDArray[np.int8]]:
     scan = Scan(
         part.problem,
         float(inputs["polarity"].values.item()) if "polarity" in inputs else 1.0,
-        {name: one.set_dims(sizes).values.ravel() for name, one in blocks.items()},
+        {name: variable.set_dims(sizes).values.ravel() for name, variable in blocks.items()},
     )
     targets = target.set_dims(part.sizes).values.ravel()
     block = places.set_dims(part.sizes).values.ravel()
@@ -182,7 +182,7 @@ class Scan:
         below = np.linspace(_LOWEST, _EQUAL_FROM, 4, endpoint=False)
         above = np.linspace(_HIGHEST, _EQUAL_TO, 4, endpoint=False)[::-1]
         self.xs = np.concatenate([below, equal, above])
-        count = max((one.size for one in blocks.values()), default=1)
+        count = max((values.size for values in blocks.values()), default=1)
         block = np.repeat(np.arange(count), self.xs.size)
         #: Displacements, (block, step).
         self.displacements = self.displacement(block, np.tile(self.xs, count)).reshape(count, -1)
@@ -196,19 +196,19 @@ class Scan:
         inputs = dict(self.motion)
         factor: Floats | float = 1.0
         for name, values in self.blocks.items():
-            one = xr.Variable("cell", values[block])
+            of_cells = xr.Variable("cell", values[block])
             if name == "factor":
-                factor = one.values
+                factor = of_cells.values
                 name = "scale" if "scale" in inputs else "amplitude"
-            inputs[name] = one
+            inputs[name] = of_cells
         peak = factor * self.peak
         # where the base does not move a block, the yield acceleration does not matter
         onset = np.where(peak > 0.0, peak, 1.0) / (1.0 + np.exp(-x))
         inputs["yield_acceleration"] = xr.Variable("cell", onset)
-        wanted = limited_displacement.results_of(self.problem.model)
-        results = engine.solve(Request(self.problem, {"cell": x.size}, inputs, wanted))
+        names = limited_displacement.results_of(self.problem.model)
+        results = engine.solve(Request(self.problem, {"cell": x.size}, inputs, names))
         return limited_displacement.displacement_of(
-            {name: one.values for name, one in results.items()}
+            {name: of_cells.values for name, of_cells in results.items()}
         )
 
     def required(self, block: Indices, target: Floats) -> tuple[Floats, NDArray[np.int8]]:

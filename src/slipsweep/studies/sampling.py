@@ -62,10 +62,10 @@ SOBOL_MEMORY = 8 * RESAMPLES * _PARTS
 class Distribution:
     """Distribution of an uncertain parameter: an entry of `uncertain`, called `key` in errors."""
 
-    def __init__(self, key: str, parameter: str, given: Any, g: float) -> None:
+    def __init__(self, key: str, parameter: str, entry: Any, g: float) -> None:
         from scipy import stats
 
-        entries = dict(given) if isinstance(given, Mapping) else {"distribution": given}
+        entries = dict(entry) if isinstance(entry, Mapping) else {"distribution": entry}
         chosen = entries.pop("distribution", None)
         #: "absolute": a draw is the value; "factor": it multiplies the value of the grid point;
         #: "offset": it is added to that.
@@ -73,11 +73,11 @@ class Distribution:
             f"{key}.kind", entries.pop("kind", "absolute"), ("absolute", "factor", "offset")
         )
         units = entries.pop("units", None)
-        own = PARAMETERS[parameter]["units"]
+        unit_of_parameter = PARAMETERS[parameter]["units"]
         if units is not None and (self.kind == "factor" or not isinstance(units, str)):
             raise InputError(
                 f"{key}.units = {shown(units)}: not allowed with kind = 'factor', else a unit "
-                f"that converts to {own}"
+                f"that converts to {unit_of_parameter}"
             )
         #: A frozen distribution of scipy.stats, or anything else with a ``ppf``.
         self.frozen = chosen
@@ -122,7 +122,7 @@ class Distribution:
                 f"{self.about}"
             )
         #: Factor on draws, to have them in the parameter's own unit.
-        self.unit = conversion(f"{key}.units", own, units, g)
+        self.unit = conversion(f"{key}.units", unit_of_parameter, units, g)
         self.about |= (
             {"units": units, "kind": self.kind} if units is not None else {"kind": self.kind}
         )
@@ -174,8 +174,8 @@ class Sampling:
 
         self.keys = keys
         if not isinstance(uncertain, Mapping) or not uncertain:
-            known = f"must give the distribution of one parameter at least: {', '.join(DRAWN)}"
-            raise InputError(f"{self.key('').removesuffix('.')}: {known}")
+            advice = f"must give the distribution of one parameter at least: {', '.join(DRAWN)}"
+            raise InputError(f"{self.key('').removesuffix('.')}: {advice}")
         for name in uncertain:
             if name not in DRAWN:
                 raise InputError(
@@ -256,8 +256,8 @@ class Sampling:
             uniform = norm.cdf(np.linalg.cholesky(self.matrix) @ norm.ppf(uniform))
             uniform = np.clip(uniform, _LEAST, 1.0 - 2.0**-53)
         drawn = {}
-        for at, (name, one) in enumerate(self.distributions.items()):
-            first, *others = (one.draws(row) for row in uniform[:, at])
+        for at, (name, distribution) in enumerate(self.distributions.items()):
+            first, *others = (distribution.draws(row) for row in uniform[:, at])
             mixed = [
                 second if name in group else first
                 for second in others
@@ -268,22 +268,22 @@ class Sampling:
 
     def check_draws(self, coords: Mapping[str, xr.Variable]) -> None:
         """Raise InputError for draws that no physics allows, on a grid of these coordinates."""
-        for name, one in self.distributions.items():
+        for name, distribution in self.distributions.items():
             bound = parameters.BOUNDS[name]
             # each draw's value is monotone in what it is applied to: the ends of the axis are its
             # extremes.  A factor on an estimate is checked by itself: the failure of the estimate
             # is a flag of the result
-            bases = [1.0 if one.kind == "factor" else 0.0]
+            bases = [1.0 if distribution.kind == "factor" else 0.0]
             if name in coords:
                 bases = [float(coords[name].values.min()), float(coords[name].values.max())]
             outside, base = max(
-                (float(np.mean(~bound.holds(one.applied(at, self.draws[name])))), at)
+                (float(np.mean(~bound.holds(distribution.applied(at, self.draws[name])))), at)
                 for at in bases
             )
             if outside:
-                about = f" as {one.kind} on {name} = {base:.6g}" if name in coords else ""
+                about = f" as {distribution.kind} on {name} = {base:.6g}" if name in coords else ""
                 raise InputError(
-                    f"{self.key(name)} = {one}{about}: {outside:.2%} of the draws are not "
+                    f"{self.key(name)} = {distribution}{about}: {outside:.2%} of the draws are not "
                     f"{bound.text}: take a distribution that has none there, such as lognorm, or "
                     "truncate it (truncnorm)"
                 )
@@ -294,7 +294,9 @@ class Sampling:
         from scipy import __version__
 
         attributes = {
-            "uncertain": json.dumps({name: one.about for name, one in self.distributions.items()}),
+            "uncertain": json.dumps(
+                {name: distribution.about for name, distribution in self.distributions.items()}
+            ),
             "samples": self.samples,
             "sampling": f"{self.method} (scipy {__version__})",
             "seed": self.seed,
@@ -313,33 +315,35 @@ def _arguments(family: Any) -> tuple[str, ...]:
     return (*(family.shapes or "").replace(",", " ").split(), "loc", "scale")
 
 
-def check_thresholds(key: str, given: Any, g: float) -> Floats:
+def check_thresholds(key: str, thresholds: Any, g: float) -> Floats:
     """Return displacements, m or with a unit, as an increasing coordinate of one value at least."""
-    entries = np.atleast_1d(np.asarray(parameters.computed(given), object)).tolist()
-    values = [quantity(key, one, "m", g) if isinstance(one, str) else one for one in entries]
+    entries = np.atleast_1d(np.asarray(parameters.computed(thresholds), object)).tolist()
+    values = [
+        quantity(key, entry, "m", g) if isinstance(entry, str) else entry for entry in entries
+    ]
     return check_increasing(key, values, "threshold")
 
 
-def check_increasing(key: str, given: Any, bound: str) -> Floats:
+def check_increasing(key: str, numbers: Any, bound: str) -> Floats:
     """Return numbers within the bounds of a parameter as an increasing coordinate (not empty)."""
-    values = np.atleast_1d(parameters.check_values(bound, given, key))
+    values = np.atleast_1d(parameters.check_values(bound, numbers, key))
     if values.ndim > 1 or not values.size:
-        raise InputError(f"{key} = {shown(given)}: must be a list of one number or more")
+        raise InputError(f"{key} = {shown(numbers)}: must be a list of one number or more")
     for at in np.flatnonzero(np.diff(values) <= 0.0)[:1]:
-        before, after = (number_text(float(one)) for one in values[at : at + 2])
+        before, after = (number_text(float(value)) for value in values[at : at + 2])
         raise InputError(f"{key}: {after} after {before}: they must increase")
     return values
 
 
-def _pairs(key: str, given: Any, known: Sequence[str]) -> tuple[tuple[str, str, float], ...]:
+def _pairs(key: str, correlation: Any, names: Sequence[str]) -> tuple[tuple[str, str, float], ...]:
     """Return correlations: pairs of drawn parameters with a number between -1 and 1."""
     pairs: dict[frozenset[str], tuple[str, str, float]] = {}
-    for entry in check_list(key, given, '["NAME", "OTHER", NUMBER]'):
-        one = check_list(key, entry, "two names and a number")
-        if len(one) != 3:
+    for entry in check_list(key, correlation, '["NAME", "OTHER", NUMBER]'):
+        triple = check_list(key, entry, "two names and a number")
+        if len(triple) != 3:
             raise InputError(f'{key} = {shown(entry)}: must be ["NAME", "OTHER", NUMBER]')
-        first, second = (check_choice(key, name, known) for name in one[:2])
-        value = check_finite(key, one[2])
+        first, second = (check_choice(key, name, names) for name in triple[:2])
+        value = check_finite(key, triple[2])
         pair = frozenset((first, second))
         if len(pair) < 2 or pair in pairs or not -1.0 < value < 1.0:
             what = "two parameters, each pair once, and a number between -1 and 1"
@@ -355,7 +359,7 @@ def sobol_indices(sampling: Sampling, displacement: Floats) -> dict[str, NDArray
     the frequency, as u = W/ω².
     """
     runs = displacement.reshape(-1, len(sampling.independent) + 2, sampling.samples)
-    status, values = zip(*(_of_point(one, sampling.seed) for one in runs), strict=True)
+    status, values = zip(*(_of_point(of_point, sampling.seed) for of_point in runs), strict=True)
     results = {"sensitivity_status": np.array(status, np.int8)}
     for at, kind in enumerate(("first_order", "total")):
         indices = np.stack(values)[:, :, at]  # (point, index and ends of its interval, input)

@@ -11,6 +11,7 @@ import xarray as xr
 from slipsweep.errors import InputError
 from slipsweep.grid.resources import grid_text
 from slipsweep.model.parameters import check_list, number_text, shown
+from slipsweep.model.units import in_mm
 from slipsweep.model.variables import (
     STATISTIC_COORDINATES,
     SUITE_STATISTICS,
@@ -115,7 +116,7 @@ def suite_statistics(
     dims = suite_dims(result["permanent_displacement"], over)
     g = float(result.attrs.get("g", np.nan))
     limits = check_thresholds("thresholds", thresholds, g)
-    wanted = check_increasing("quantiles", quantiles, "quantile")
+    shares = check_increasing("quantiles", quantiles, "quantile")
     least, *others = check_thresholds("zero", zero, g)
     if others:
         raise InputError(f"zero = {shown(zero)}: must be one displacement")
@@ -127,26 +128,30 @@ def suite_statistics(
     codes = result["validity"].fillna(0).astype(np.int16).load()
     there = moved.notnull()
     total = int(np.prod([moved.sizes[dim] for dim in dims]))
-    places = {"flag": np.array(REASONS, np.int16), "threshold": limits, "quantile": wanted}
-    own = {
+    places = {"flag": np.array(REASONS, np.int16), "threshold": limits, "quantile": shares}
+    statistic_coords = {
         dim: xr.Variable(dim, values, STATISTIC_COORDINATES[dim]) for dim, values in places.items()
     }
     meanings = " ".join((flag.name or "").lower() for flag in REASONS)
-    own["flag"].attrs |= {"flag_values": [*map(int, REASONS)], "flag_meanings": meanings}
+    statistic_coords["flag"].attrs |= {
+        "flag_values": [*map(int, REASONS)],
+        "flag_meanings": meanings,
+    }
     count = there.sum(dims)
     slid = moved.where(moved > least)
     logs: xr.DataArray = np.log(slid)  # type: ignore[assignment]
-    found = {
+    is_flagged = ~there & (codes & statistic_coords["flag"] != 0)
+    statistics = {
         "value_count": count.astype(np.int32),
         "valueless_count": (total - count).astype(np.int32),
-        "valueless_flag_count": (~there & (codes & own["flag"] != 0)).sum(dims).astype(np.int32),
+        "valueless_flag_count": is_flagged.sum(dims).astype(np.int32),
         "valueless_share": (total - count) / total,
         "zero_probability": (moved <= least).where(there).mean(dims),
         "nonzero_median": slid.median(dims),
         "nonzero_geometric_mean": np.exp(logs.mean(dims)),
         "log_standard_deviation": logs.std(dims, ddof=1).where(slid.count(dims) > 1),
-        "displacement_quantile": _quantiles(moved, wanted, dims),
-        "exceedance_probability": (moved > own["threshold"]).where(there).mean(dims),
+        "displacement_quantile": _quantiles(moved, shares, dims),
+        "exceedance_probability": (moved > statistic_coords["threshold"]).where(there).mean(dims),
     }
     attrs = {
         **result.attrs,
@@ -155,17 +160,17 @@ def suite_statistics(
         "zero_displacement": float(least),
     }
     grid = [dim for dim in moved.dims if dim not in dims]
-    laid = {name: one.transpose(*grid, ...) for name, one in found.items()}
+    laid = {name: variable.transpose(*grid, ...) for name, variable in statistics.items()}
     variables = {
-        name: (one.dims, one.values, counted(SUITE_STATISTICS[name], result.attrs))
-        for name, one in laid.items()
+        name: (variable.dims, variable.values, counted(SUITE_STATISTICS[name], result.attrs))
+        for name, variable in laid.items()
     }
     coords = {
-        name: one.variable
-        for name, one in result.coords.items()
-        if not {*dims, *own} & {*one.dims, name}
+        name: coordinate.variable
+        for name, coordinate in result.coords.items()
+        if not {*dims, *statistic_coords} & {*coordinate.dims, name}
     }
-    return xr.Dataset(variables, coords | own, attrs)
+    return xr.Dataset(variables, coords | statistic_coords, attrs)
 
 
 def without_rounding(displacements: xr.DataArray) -> xr.DataArray:
@@ -181,8 +186,8 @@ def _quantiles(values: xr.DataArray, quantiles: np.ndarray, dims: Sequence[str])
     there = values.notnull().any(dims)
     full = values.where(there, 0.0)  # without any value there is no quantile
     # to leave out NaN takes ten times as long
-    found = full.quantile(quantiles, dims, skipna=bool(full.isnull().any()))
-    return found.where(there).drop_vars("quantile").transpose(..., "quantile")
+    interpolated = full.quantile(quantiles, dims, skipna=bool(full.isnull().any()))
+    return interpolated.where(there).drop_vars("quantile").transpose(..., "quantile")
 
 
 def suite_dims(values: xr.DataArray, over: Any = None) -> tuple[str, ...]:
@@ -222,8 +227,8 @@ def limit_quantiles(limits: xr.Dataset) -> xr.Dataset:
     beyond = limits["limit_status"] == LimitStatus.NOT_REACHED
     # so large that whatever is interpolated towards it is above all limits
     values = limits["limit_amplitude"].where(~beyond, np.finfo(np.float64).max / 4.0)
-    found = _quantiles(values, np.array(QUANTILES), dims)
-    quantile = found.where(~(found > values.where(~beyond).max()), np.inf).assign_attrs(
+    quantiles = _quantiles(values, np.array(QUANTILES), dims)
+    quantile = quantiles.where(~(quantiles > values.where(~beyond).max()), np.inf).assign_attrs(
         units="m s-2"
     )
     counts = {"value_count": values.count(dims), "not_reached_count": beyond.sum(dims)}
@@ -254,38 +259,44 @@ def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100)
         return [f"statistics over {suite} at {points} grid points: {how} prints those of some"]
     if is_sampled:
         missing = result["valueless_share"].broadcast_like(moved.isel(quantile=0, drop=True))
-        found = result[["displacement_quantile", "exceedance_probability"]].assign(
+        statistics = result[["displacement_quantile", "exceedance_probability"]].assign(
             valueless_share=missing
         )
-        found = at_thresholds(found, displacement).transpose(*grid, ...).load()
+        statistics = at_thresholds(statistics, displacement).transpose(*grid, ...).load()
     else:
-        found = suite_statistics(result, thresholds=0.0 if displacement is None else displacement)
+        statistics = suite_statistics(
+            result, thresholds=0.0 if displacement is None else displacement
+        )
     symbol = "|u|" if has_signed_displacements(result.attrs) else "u"
     varying = [dim for dim, size in grid.items() if size > 1]
     # peak ground accelerations in g
-    factors = {"amplitude": 1.0 / float(found.attrs.get("g", np.nan))}
+    factors = {"amplitude": 1.0 / float(statistics.attrs.get("g", np.nan))}
     labels = itertools.product(
-        *(labels_along(found, dim, factors.get(str(dim), 1.0)) for dim in varying)
+        *(labels_along(statistics, dim, factors.get(str(dim), 1.0)) for dim in varying)
     )
     columns: dict[str, Sequence[str]] = {}
     for dim, texts in zip(varying, zip(*labels, strict=True), strict=True):
-        units = found[dim].attrs.get("units", "1") if dim in found.variables else "1"
+        units = statistics[dim].attrs.get("units", "1") if dim in statistics.variables else "1"
         title = str(dim) if units == "1" else f"{dim} ({units})"
         columns[{"amplitude": "PGA (g)", "yield_coefficient": "ky"}.get(str(dim), title)] = texts
-    rows = {name: values.values.reshape(points, -1).T for name, values in found.data_vars.items()}
+    rows = {
+        name: values.values.reshape(points, -1).T for name, values in statistics.data_vars.items()
+    }
 
     def show(title: str, column: np.ndarray, as_text: str) -> None:
-        columns[title] = ["none" if np.isnan(one) else format(one, as_text) for one in column]
+        columns[title] = ["none" if np.isnan(value) else format(value, as_text) for value in column]
 
-    for share, column in zip(found["quantile"].values, rows["displacement_quantile"], strict=True):
-        show("median" if share == 0.5 else f"{100.0 * share:.3g} %", column * 1000.0, ".3g")
+    for share, column in zip(
+        statistics["quantile"].values, rows["displacement_quantile"], strict=True
+    ):
+        show("median" if share == 0.5 else f"{100.0 * share:.3g} %", in_mm(column), ".3g")
     if not is_sampled:
         show("zero", rows["zero_probability"][0], ".1%")
     if displacement is not None or is_sampled:
         for d, column in zip(
-            found["threshold"].values, rows["exceedance_probability"], strict=True
+            statistics["threshold"].values, rows["exceedance_probability"], strict=True
         ):
-            show(f"P({symbol} > {d * 1000.0:.6g} mm)", column, ".1%")
+            show(f"P({symbol} > {in_mm(d):.6g} mm)", column, ".1%")
     if (rows["valueless_share"] > 0.0).any():
         show("no value", rows["valueless_share"][0], ".1%")
     counts = (
@@ -297,16 +308,16 @@ def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100)
     ]
 
 
-def at_thresholds(found: xr.Dataset, thresholds: Thresholds | None) -> xr.Dataset:
+def at_thresholds(statistics: xr.Dataset, thresholds: Thresholds | None) -> xr.Dataset:
     """Return statistics of `sample` at some of its thresholds (InputError: not among them)."""
     if thresholds is None:
-        return found
-    wanted = check_thresholds("thresholds", thresholds, float(found.attrs.get("g", np.nan)))
-    nearest = found.sel(threshold=wanted, method="nearest")
-    for one in wanted[~np.isclose(nearest["threshold"], wanted, rtol=1e-6)][:1]:
-        stored = ", ".join(f"{d:.6g}" for d in found["threshold"].values)
+        return statistics
+    limits = check_thresholds("thresholds", thresholds, float(statistics.attrs.get("g", np.nan)))
+    nearest = statistics.sel(threshold=limits, method="nearest")
+    for limit in limits[~np.isclose(nearest["threshold"], limits, rtol=1e-6)][:1]:
+        stored = ", ".join(f"{d:.6g}" for d in statistics["threshold"].values)
         raise InputError(
-            f"thresholds = {number_text(float(one))}: not among those of the result, {stored} m: "
+            f"thresholds = {number_text(float(limit))}: not among those of the result, {stored} m: "
             "add it to the thresholds of [uncertainty], and run again"
         )
     return nearest
@@ -315,10 +326,13 @@ def at_thresholds(found: xr.Dataset, thresholds: Thresholds | None) -> xr.Datase
 def labels_along(data: xr.Dataset, dim: Hashable, factor: float = 1.0) -> list[str]:
     """Return the names of places along a dimension: labels, numbers times a factor, or 1, 2, …"""
     name = next(
-        (one for one in (dim, "label") if one in data.variables and data[one].dims == (dim,)), None
+        (key for key in (dim, "label") if key in data.variables and data[key].dims == (dim,)), None
     )
     values = np.arange(1, data.sizes[dim] + 1) if name is None else data[name].values
-    return [str(one) if values.dtype.kind not in "iuf" else f"{one * factor:.4g}" for one in values]
+    return [
+        str(label) if values.dtype.kind not in "iuf" else f"{label * factor:.4g}"
+        for label in values
+    ]
 
 
 def point_names(

@@ -237,12 +237,12 @@ def plan_samples(
     problem = grid_inputs.check_problem(excitation, model, solver)
     check_drawn(sampling, tuple(inputs.given), problem)
     drawn = sampling.distributions
-    absolute = [name for name, one in drawn.items() if one.kind == "absolute"]
+    absolute = [name for name, distribution in drawn.items() if distribution.kind == "absolute"]
     # 0.5: a value that every parameter may have
     planned = replace(inputs, **dict.fromkeys(absolute, 0.5))
-    wanted = ["permanent_displacement"]
+    names = ["permanent_displacement"]
     plan = plans.plan_sweep(
-        planned, excitation=excitation, model=model, solver=solver, variables=wanted
+        planned, excitation=excitation, model=model, solver=solver, variables=names
     )
     tangents = [name for angle, name in variables.ANGLES.items() if angle in drawn]
     dropped = {*absolute, *tangents}
@@ -254,20 +254,24 @@ def plan_samples(
     coords = {name: variable for name, variable in plan.coords.items() if name not in dropped}
     sampling.check_draws(coords)
     about = options.friction_inputs(
-        problem.model.name, coords, {name: one.kind for name, one in drawn.items()}
+        problem.model.name,
+        coords,
+        {name: distribution.kind for name, distribution in drawn.items()},
     )
     title = variables.counted_text(TITLE, plan.attrs)
     attrs = {**plan.attrs, "title": title, "friction_inputs": about, **sampling.attributes}
     return SamplePlan(sampling, problem, coords, attrs)
 
 
-def check_drawn(sampling: Sampling, given: Sequence[str], problem: grid_inputs.Problem) -> None:
+def check_drawn(
+    sampling: Sampling, given_names: Sequence[str], problem: grid_inputs.Problem
+) -> None:
     """Raise InputError for draws that cannot be used.
 
     They are draws of a parameter that the model or the shaking does not have, that is given as
     well, or of which a factor or an offset has no value to act on.
     """
-    if "structure_frequency" in given:
+    if "structure_frequency" in given_names:
         raise InputError(
             "structure_frequency: not allowed with uncertain inputs: the displacement does not "
             "depend on it"
@@ -275,25 +279,25 @@ def check_drawn(sampling: Sampling, given: Sequence[str], problem: grid_inputs.P
     recorded = not isinstance(problem.excitation, Waveform)
     kinds = (variables.WAVEFORM_INPUTS, variables.RECORD_INPUTS)
     foreign = {*kinds[not recorded]} - {*kinds[recorded]}
-    for name, one in sampling.distributions.items():
+    for name, distribution in sampling.distributions.items():
         key = sampling.key(name)
         friction_law = name in ("decay_rate", "delta_mu", "minimum_friction")
         if name in foreign:
             raise InputError(f"{key}: not allowed with {'a Record' if recorded else 'a waveform'}")
         if friction_law and isinstance(problem.model, options.Newmark):
             raise InputError(f"{key}: not allowed with Newmark's block, which has no friction law")
-        if one.kind == "absolute" and name in given:
+        if distribution.kind == "absolute" and name in given_names:
             raise InputError(
                 f'{key}: is drawn, but {name} is given as well: remove it, or give kind = "factor" '
                 'or "offset" to draw about what is given'
             )
         # under a record each pulse has estimates of its own, but for Coulomb's yield acceleration
-        estimated = friction_law and one.kind == "factor" and not recorded
+        estimated = friction_law and distribution.kind == "factor" and not recorded
         if name == "yield_acceleration":
-            estimated = "yield_coefficient" not in {*given, *sampling.distributions}
-        if one.kind != "absolute" and name not in given and not estimated:
+            estimated = "yield_coefficient" not in {*given_names, *sampling.distributions}
+        if distribution.kind != "absolute" and name not in given_names and not estimated:
             raise InputError(
-                f'{key}: kind = "{one.kind}" needs {name} given, to which it is relative'
+                f'{key}: kind = "{distribution.kind}" needs {name} given, to which it is relative'
             )
 
 
@@ -424,7 +428,7 @@ class SamplePlan(plans.Plan):
             "threshold": self.sampling.thresholds,
             "mode": np.array(_MODES, np.int8),
             "flag": np.array(variables.Validity, np.int16),
-            "input": ["+".join(one) for one in self.sampling.independent],
+            "input": ["+".join(entry) for entry in self.sampling.independent],
             "bound": [*ENDS],
         }
         own_dims = dict.fromkeys(dim for dims in self.results.values() for dim in dims)
@@ -432,10 +436,10 @@ class SamplePlan(plans.Plan):
             dim: xr.Variable((dim,), values[dim], variables.STATISTIC_COORDINATES[dim])
             for dim in own_dims
         }
-        lengths = self.sizes | {dim: one.size for dim, one in own_coords.items()}
+        lengths = self.sizes | {dim: entry.size for dim, entry in own_coords.items()}
         results = {}
-        for name, own in self.results.items():
-            dims = (*(self.sizes if name in _BY_FREQUENCY else self.solved), *own)
+        for name, more_dims in self.results.items():
+            dims = (*(self.sizes if name in _BY_FREQUENCY else self.solved), *more_dims)
             zero = np.zeros((), variables.RESULT_DTYPES.get(name, "float64"))
             results[name] = (
                 dims,
@@ -510,7 +514,7 @@ class SamplePlan(plans.Plan):
         for wrong in frequency[np.isinf(moved).any(axis=-1)][:1]:
             text = parameters.number_text(float(wrong))
             raise InputError(f"frequency or 1 / time_scale = {text}: must be nearer to 1")
-        found = {
+        statistics = {
             "displacement_quantile": moved[..., :-1],
             "mean_displacement": moved[..., -1],
             "exceedance_probability": exceeding,
@@ -520,12 +524,12 @@ class SamplePlan(plans.Plan):
             "valueless_share": np.isnan(displacement).mean(axis=-1),
         }
         for codes in modes:
-            found["mode_share"] = np.stack(
+            statistics["mode_share"] = np.stack(
                 [np.mean(codes == mode, axis=-1) for mode in _MODES], axis=-1
             )
         if sampling.sensitivity:
-            found |= sobol_indices(sampling, runs[0])
-        return found
+            statistics |= sobol_indices(sampling, runs[0])
+        return statistics
 
     def _drawn(
         self, chunk: chunks.Chunk, sizes: dict[str, int]
@@ -534,13 +538,13 @@ class SamplePlan(plans.Plan):
         inputs = chunks.variables_within(chunk, self.inputs)
         sizes = sizes | self.pooled | {_DRAW: self.sampling.runs}
         drawn = {name: xr.Variable((_DRAW,), draws) for name, draws in self.sampling.draws.items()}
-        for name, one in self.sampling.distributions.items():
-            if name in inputs or one.kind == "absolute":
-                inputs[name] = one.applied(inputs.get(name), drawn.pop(name))
+        for name, distribution in self.sampling.distributions.items():
+            if name in inputs or distribution.kind == "absolute":
+                inputs[name] = distribution.applied(inputs.get(name), drawn.pop(name))
         for angle, name in variables.ANGLES.items():
             if angle in inputs:
                 inputs[name] = parameters.friction_coefficient(inputs.pop(angle))
-        for name in (one for one in _ESTIMATED if one in drawn):
+        for name in (estimated for estimated in _ESTIMATED if estimated in drawn):
             # Coulomb's yield acceleration depends on no shaking, which a record has of its own
             every = {"amplitude": xr.Variable((), 0.0), **inputs}
             request = engine.Request(self.problem, grid_inputs.grid_sizes(every), every, (name,))

@@ -30,8 +30,8 @@ def upslope_yield_acceleration(
     tan_theta = xr.apply_ufunc(np.tan, np.radians(1.0) * theta)
 
     def by_statics(onset: Any, tangent: Any) -> Any:
-        given = {"yield_acceleration": onset, "tan_theta": tangent}
-        return engine.upslope_yield_acceleration(given, g)
+        interface = {"yield_acceleration": onset, "tan_theta": tangent}
+        return engine.upslope_yield_acceleration(interface, g)
 
     onset: xr.DataArray = xr.apply_ufunc(by_statics, yield_acceleration, tan_theta)
     return onset
@@ -120,7 +120,9 @@ def _recorded_peaks(data: xr.Dataset, motion: Record | Suite) -> tuple[Any, Any]
     if isinstance(motion, Suite):
         record = motion[str(data["motion"].item())]
         motion = record.rotated(data["azimuth"].item()) if isinstance(record, Pair) else record
-    coords = {str(name): one.reset_coords(drop=True) for name, one in data.coords.items()}
+    coords = {
+        str(name): coordinate.reset_coords(drop=True) for name, coordinate in data.coords.items()
+    }
     factor = strength_factor(motion.times, motion.acceleration, coords) * coords["polarity"]
     ends = [factor * end for end in (motion.acceleration.min(), motion.acceleration.max())]
     return np.maximum(*ends), -np.minimum(*ends)

@@ -209,21 +209,23 @@ def coefficients_of(
         )  # of friction by the block's acceleration, near enough
         noise = noise_of(block) * slope
         every = np.concatenate(inside)
-        levels = np.array([np.nanmean(one[:, 0]) for one in inside])
+        levels = np.array([np.nanmean(samples[:, 0]) for samples in inside])
         (starts, between) = np.array(begins).T
         kinetic = _mean(levels, noise / (every.shape[0] / len(levels)) ** 0.5, 0.0)
         static = _mean(free_body_friction(starts, theta, g), noise, float(np.mean(between)) * slope)
         scatter = float(np.nanmean((every[:, 0] - kinetic[1]) ** 2)) - noise**2
         level = kinetic[1] > 0.0 and max(scatter, 0.0) ** 0.5 < _LEVEL * kinetic[1]
         constant = level and float(np.nanquantile(every[:, 1], _LOW_SHARE)) < _LOW * mu_s
-    found = {}
+    coefficients = {}
     for kind, (low, value, high) in (("static", static), ("kinetic", kinetic)):
         name = f"{kind} friction coefficient by statics"
         about, of_interval = (
             {"units": "1", "long_name": text} for text in (name, f"95 % interval of the {name}")
         )
-        found[f"{kind}_friction"] = xr.Variable((), value, about)
-        found[f"{kind}_friction_interval"] = xr.Variable(("bound",), [low, high], of_interval)
+        coefficients[f"{kind}_friction"] = xr.Variable((), value, about)
+        coefficients[f"{kind}_friction_interval"] = xr.Variable(
+            ("bound",), [low, high], of_interval
+        )
     sentence = (
         f"This is a block of constant friction: by statics {kinetic[1]:.3g} while it slides, "
         "though Eq. 1 falls. Newmark's model is the right one for it."
@@ -234,7 +236,7 @@ def coefficients_of(
             f"it, more than mu_s = {mu_s:.3g}: are signs and units of all channels, theta and mu_s "
             "right?"
         )
-    return xr.Dataset(found, attrs={"constant_friction": sentence if constant else ""})
+    return xr.Dataset(coefficients, attrs={"constant_friction": sentence if constant else ""})
 
 
 def _mean(values: Floats, noise: float, systematic: float) -> Floats:
