@@ -211,8 +211,10 @@ def coefficients_of(
         every = np.concatenate(inside)
         levels = np.array([np.nanmean(samples[:, 0]) for samples in inside])
         (starts, between) = np.array(begins).T
-        kinetic = _mean(levels, noise / (every.shape[0] / len(levels)) ** 0.5, 0.0)
-        static = _mean(free_body_friction(starts, theta, g), noise, float(np.mean(between)) * slope)
+        kinetic = mean_with_interval(levels, noise / (every.shape[0] / len(levels)) ** 0.5, 0.0)
+        static = mean_with_interval(
+            free_body_friction(starts, theta, g), noise, float(np.mean(between)) * slope
+        )
         scatter = float(np.nanmean((every[:, 0] - kinetic[1]) ** 2)) - noise**2
         level = kinetic[1] > 0.0 and max(scatter, 0.0) ** 0.5 < _LEVEL * kinetic[1]
         constant = level and float(np.nanquantile(every[:, 1], _LOW_SHARE)) < _LOW * mu_s
@@ -239,7 +241,7 @@ def coefficients_of(
     return xr.Dataset(coefficients, attrs={"constant_friction": sentence if constant else ""})
 
 
-def _mean(values: Floats, noise: float, systematic: float) -> Floats:
+def mean_with_interval(values: Floats, noise: float, systematic: float) -> Floats:
     """Return the mean of a value for each slide, between the ends of its 95 % interval.
 
     The interval has the scatter of the values or their noise, whichever is larger, and a systematic
