@@ -176,69 +176,77 @@ def coefficients_of(
 ) -> xr.Dataset:
     """Return static and kinetic friction by statics, with 95 % intervals.
 
-    They are those of the slides that begin downslope.
-
-    The attribute `constant_friction` is a sentence if friction is level while the block slides,
-    where Eq. 1 falls.
+    They are those of the slides that begin downslope.  The attribute `constant_friction` is a
+    sentence if friction is level while the block slides, where Eq. 1 falls.
     """
     threshold = threshold_of(table, block)[0]
-    relative = table - block
     eq1 = eq1_friction(table, block, theta, mu_s, g)
     free = free_body_friction(block, theta, g)
     inside = []
-    begins = []
+    onsets = []
     for slide in slides:
         part = slice(slide.start + _AT_ENDS, (slide.stop or table.size) - _AT_ENDS)
-        downslope = np.nanmean(relative[slide.start : slide.start + _AT_ENDS]) > 0.0
-        if np.isfinite(free[part]).sum() < 3 or not downslope:
-            continue
-        inside.append(np.column_stack([free[part], eq1[part]]))
-        first = slide.start + int(np.argmax(relative[slide] > threshold))
-        begin = np.nanmean(block[first : first + _FIRST])
-        before = table[max(first - 1, 0)]
-        after = table[first]
-        jumps = (
-            before - begin > threshold
-        )  # else it would have been seen to slide at the sample before
-        begins.append((0.5 * (before + after), 0.5 * (after - before)) if jumps else (begin, 0.0))
+        first = slice(slide.start, slide.start + _AT_ENDS)
+        is_downslope = np.nanmean((table - block)[first]) > 0.0
+        if is_downslope and np.isfinite(free[part]).sum() >= 3:
+            inside.append(np.column_stack([free[part], eq1[part]]))
+            onsets.append(_block_at_onset(table, block, slide, threshold))
     static = kinetic = np.full(3, np.nan)
-    constant = False
+    is_constant = False
     if inside:
-        slope = (
-            1.0 / g / np.cos(np.radians(theta)) ** 2
-        )  # of friction by the block's acceleration, near enough
+        # slope of the friction over the block's acceleration, near enough
+        slope = 1.0 / g / np.cos(np.radians(theta)) ** 2
         noise = noise_of(block) * slope
-        every = np.concatenate(inside)
-        levels = np.array([np.nanmean(samples[:, 0]) for samples in inside])
-        (starts, between) = np.array(begins).T
-        kinetic = mean_with_interval(levels, noise / (every.shape[0] / len(levels)) ** 0.5, 0.0)
-        static = mean_with_interval(
-            free_body_friction(starts, theta, g), noise, float(np.mean(between)) * slope
-        )
-        scatter = float(np.nanmean((every[:, 0] - kinetic[1]) ** 2)) - noise**2
-        level = kinetic[1] > 0.0 and max(scatter, 0.0) ** 0.5 < _LEVEL * kinetic[1]
-        constant = level and float(np.nanquantile(every[:, 1], _LOW_SHARE)) < _LOW * mu_s
+        samples = np.concatenate(inside)
+        levels = np.array([np.nanmean(of_slide[:, 0]) for of_slide in inside])
+        noise_of_level = noise / (samples.shape[0] / len(levels)) ** 0.5
+        kinetic = mean_with_interval(levels, noise_of_level, 0.0)
+        starts, errors = np.array(onsets).T
+        systematic = float(np.mean(errors)) * slope
+        static = mean_with_interval(free_body_friction(starts, theta, g), noise, systematic)
+        scatter = float(np.nanmean((samples[:, 0] - kinetic[1]) ** 2)) - noise**2
+        is_level = kinetic[1] > 0.0 and max(scatter, 0.0) ** 0.5 < _LEVEL * kinetic[1]
+        is_constant = is_level and float(np.nanquantile(samples[:, 1], _LOW_SHARE)) < _LOW * mu_s
     coefficients = {}
     for kind, (low, value, high) in (("static", static), ("kinetic", kinetic)):
         name = f"{kind} friction coefficient by statics"
-        about, of_interval = (
-            {"units": "1", "long_name": text} for text in (name, f"95 % interval of the {name}")
-        )
+        about = {"units": "1", "long_name": name}
+        of_interval = {"units": "1", "long_name": f"95 % interval of the {name}"}
+        interval = xr.Variable(("bound",), [low, high], of_interval)
         coefficients[f"{kind}_friction"] = xr.Variable((), value, about)
-        coefficients[f"{kind}_friction_interval"] = xr.Variable(
-            ("bound",), [low, high], of_interval
-        )
-    sentence = (
-        f"This is a block of constant friction: by statics {kinetic[1]:.3g} while it slides, "
-        "though Eq. 1 falls. Newmark's model is the right one for it."
-    )
-    if max(static[1], kinetic[1]) > _TOO_MUCH * mu_s:
-        sentence = (
-            f"By statics friction is {static[1]:.3g} where a slide begins and {kinetic[1]:.3g} in "
-            f"it, more than mu_s = {mu_s:.3g}: are signs and units of all channels, theta and mu_s "
+        coefficients[f"{kind}_friction_interval"] = interval
+    sentence = _constant_friction_text(static[1], kinetic[1], mu_s) if is_constant else ""
+    return xr.Dataset(coefficients, attrs={"constant_friction": sentence})
+
+
+def _block_at_onset(
+    table: Floats, block: Floats, slide: slice, threshold: float
+) -> tuple[float, float]:
+    """Return the block's acceleration at the onset of a slide, and its error, m/s².
+
+    If the block's acceleration jumps at the onset, the onset lies between two samples of the table.
+    """
+    first = slide.start + int(np.argmax((table - block)[slide] > threshold))
+    after_onset = float(np.nanmean(block[first : first + _FIRST]))
+    before = float(table[max(first - 1, 0)])
+    after = float(table[first])
+    # without a jump the block would slide at the sample before, too
+    jumps = before - after_onset > threshold
+    return (0.5 * (before + after), 0.5 * (after - before)) if jumps else (after_onset, 0.0)
+
+
+def _constant_friction_text(static: float, kinetic: float, mu_s: float) -> str:
+    """Return the sentence on constant friction; friction far above μs is doubted."""
+    if max(static, kinetic) > _TOO_MUCH * mu_s:
+        return (
+            f"By statics friction is {static:.3g} where a slide begins and {kinetic:.3g} in it, "
+            f"more than mu_s = {mu_s:.3g}: are signs and units of all channels, theta and mu_s "
             "right?"
         )
-    return xr.Dataset(coefficients, attrs={"constant_friction": sentence if constant else ""})
+    return (
+        f"This is a block of constant friction: by statics {kinetic:.3g} while it slides, though "
+        "Eq. 1 falls. Newmark's model is the right one for it."
+    )
 
 
 def mean_with_interval(values: Floats, noise: float, systematic: float) -> Floats:
