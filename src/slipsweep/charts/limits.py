@@ -29,8 +29,10 @@ from slipsweep.model.variables import STRENGTHS, LimitStatus, StrengthStatus
 from slipsweep.published import EQUATIONS
 from slipsweep.studies.suite_statistics import SUITE, limit_quantiles
 
-#: Most grid points of annual rates, a curve each; most displacements that are marked.
+#: Most curves of annual rates, one for each grid point.
 _MOST_CURVES = 8
+
+#: Most displacements that are marked without being requested.
 _MOST_MARKS = 20
 
 
@@ -54,7 +56,7 @@ def limit(result: Result, options: Options) -> Figure:
             labels = [style.plain(name) for name in axis_labels(sheet.data, sheet.x)]
             panel.axes.set_xticks(panel.xs, labels, rotation=40, ha="right")
             panel.axes.set_xlabel(sheet.x)
-    # one scale for all, from zero; only now, for it ends the autoscaling
+    # one scale for all, from zero; it is set last, because it ends the autoscaling
     sheet.panels[0].axes.set_ylim(bottom=0.0)
     if not np.isfinite(sheet.data["limit_amplitude"]).any():
         sheet.note("No limits to draw: limit_status has the reasons.")

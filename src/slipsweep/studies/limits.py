@@ -198,8 +198,7 @@ def plan_limits(
     dims = target.dims
     values = target.values
     steps = parameters.check_whole("amplitude_steps", amplitude_steps, 2, 1_000_000)
-    # displacement and amplitude change places: in the layout of the grid it stands where the
-    # amplitude would
+    # the displacement takes the place of the amplitude among the dimensions of the grid
     swapped = replace(inputs, amplitude=xr.Variable(dims, values))
     plan = plan_sweep(
         swapped, excitation=excitation, model=model, variables=["permanent_displacement"]
@@ -386,7 +385,7 @@ def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) 
     names = ("yield_acceleration", *limited)
     blocks["amplitude"] = xr.Variable((), 0.0)
     accelerations = engine.friction_parameters(Request(problem, sizes, blocks, names))
-    # a pulse begins to count, or changes its mode, where its own peak passes Üy or Üg,lim, which do
+    # a pulse begins to slide, or changes its mode, where its own peak passes Üy or Üg,lim; these do
     # not depend on A
     thresholds = np.stack([accelerations[name].values.ravel() for name in names], axis=1)
     yields = thresholds[:, :1]
@@ -463,13 +462,12 @@ def _hidden_peaks(scan: Scan, before: NDArray[np.bool_]) -> Iterator[Steps]:
 
     `before`, (cell, step), is True as long as the scan itself has not reached the target.
     """
-    # blocks that do not recouple: u jumps up each time that they come to rest one pulse earlier,
-    # and then falls
+    # if a block does not recouple, u jumps up where it comes to rest one pulse earlier, then falls
     saw, parts = (0.7, 128) if isinstance(scan.problem.excitation, Record) else (0.5, 512)
     moved = scan.displacements
     slides_on = scan.results["validity"] & Validity.NOT_RECOUPLED.value != 0
-    # the part of a target from which on a point may lie next to a peak, and a maximum of the scan
-    # to a higher one
+    # from this part of a target on, a point may lie next to a peak, or a maximum next to a higher
+    # one
     least = np.where(slides_on, saw, np.inf)
     peaks = (moved[:, 1:-1] > moved[:, :-2]) & (moved[:, 1:-1] > moved[:, 2:])
     least[:, 1:-1][peaks & ~slides_on[:, 1:-1]] = 0.9

@@ -225,7 +225,7 @@ def limit_quantiles(limits: xr.Dataset) -> xr.Dataset:
     """
     dims = suite_dims(limits["limit_amplitude"])
     beyond = limits["limit_status"] == LimitStatus.NOT_REACHED
-    # so large that whatever is interpolated towards it is above all limits
+    # so large that a value interpolated towards it is above all limits
     values = limits["limit_amplitude"].where(~beyond, np.finfo(np.float64).max / 4.0)
     quantiles = _quantiles(values, np.array(QUANTILES), dims)
     quantile = quantiles.where(~(quantiles > values.where(~beyond).max()), np.inf).assign_attrs(

@@ -250,7 +250,7 @@ def plan_samples(
         "displacement_amplitude" in plan.coords
         and {"displacement_amplitude", "frequency"} & dropped
     ):
-        dropped.add("amplitude")  # A = ω²d of no value is nobody's amplitude
+        dropped.add("amplitude")  # without values of d and f there is no A = ω²d
     coords = {name: variable for name, variable in plan.coords.items() if name not in dropped}
     sampling.check_draws(coords)
     about = options.friction_inputs(
@@ -545,11 +545,11 @@ class SamplePlan(plans.Plan):
             if angle in inputs:
                 inputs[name] = parameters.friction_coefficient(inputs.pop(angle))
         for name in (estimated for estimated in _ESTIMATED if estimated in drawn):
-            # Coulomb's yield acceleration depends on no shaking, which a record has of its own
+            # Coulomb's yield acceleration does not depend on the amplitude, which a record lacks
             every = {"amplitude": xr.Variable((), 0.0), **inputs}
             request = engine.Request(self.problem, grid_inputs.grid_sizes(every), every, (name,))
             estimate = engine.friction_parameters(request, finite=False)[name]
             values = self.sampling.distributions[name].applied(estimate, drawn[name])
-            # NaN leaves it to the estimate and its flag where that fails
+            # where the estimate fails, NaN lets the kernel estimate it and raise the flag
             inputs[name] = values.where(parameters.BOUNDS[name].holds(values))
         return inputs, sizes

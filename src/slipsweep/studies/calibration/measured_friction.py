@@ -38,22 +38,25 @@ QUANTILE = 1.959964
 #: Types of a test.
 Test = str | Path | ShakingTest | xr.Dataset | Mapping[str, xr.DataArray]
 
-#: The threshold of a slide: standard deviations of the noise of r, of which one sample in 16 000
-#: exceeds 4 by chance, and at least a part of the table's largest acceleration, by which two
-#: sensors may disagree.
+#: Threshold of a slide in standard deviations of the noise of r; one sample in 16 000 exceeds it by
+#: chance.
 NOISE_IN_THRESHOLD = 4.0
+
+#: Least threshold in parts of the table's largest acceleration: two sensors may differ by this.
 LEAST_THRESHOLD = 0.005
 
-#: Samples in turn that begin a slide by exceeding the threshold; that end one by staying below it
-#: while the integral of r is back at zero; and that end one whatever the integral, which a sensor
-#: with an offset falsifies.
+#: A slide begins where so many samples in turn exceed the threshold.
 _BEGINS = 2
+
+#: It ends where so many samples in turn stay below it and the integral of r is back at zero, or so
+#: many whatever the integral is (an offset of a sensor makes it wrong).
 _ENDS = 4
 _ENDS_ANYWAY = 20
 
-#: Samples at either end of a slide that are not taken for its friction, and those that show how it
-#: begins.
+#: Samples at either end of a slide that do not count for its friction.
 _AT_ENDS = 3
+
+#: Samples that show the onset of a slide.
 _FIRST = 6
 
 #: Friction is level if it scatters by this part of itself at most beyond the noise, and Eq. 1 falls
@@ -62,11 +65,11 @@ _LEVEL = 0.05
 _LOW_SHARE = 0.05
 _LOW = 0.8
 
-#: Constant friction of so many times the static coefficient given is that of a channel in a wrong
-#: unit, or reversed.
+#: Constant friction of more than so many times the static coefficient is doubted: a channel may
+#: have a wrong unit or sign.
 _TOO_MUCH = 1.25
 
-#: Attributes by which results are known as ours.
+#: Attributes of results: the program and the paper.
 SOURCE = {"source": f"slipsweep {__version__}", "references": REFERENCE}
 
 #: The ends of intervals of results.
@@ -82,8 +85,8 @@ def noise_of(values: Floats) -> float:
 
     It is that of third differences by their median, which few large values do not change.
     """
-    # those of white noise have 20 times its variance; those of a motion that the sampling resolves
-    # are small
+    # third differences of white noise have 20 times its variance; those of a motion that is sampled
+    # densely are small
     differences = np.diff(values[np.isfinite(values)], 3) / 20.0**0.5
     return float(1.4826 * np.median(np.abs(differences))) if differences.size else 0.0
 
@@ -124,8 +127,7 @@ def slides_of(times: Floats, table: Floats, block: Floats, threshold: float) -> 
         ):
             onset -= 1
         signed = cumulative_trapezoid(relative[onset:], times[onset:], initial=0.0)
-        # at rest r is zero and stays so, and the velocity is back at zero, but for what the noise
-        # adds up to
+        # at rest r stays zero, and the velocity is back at zero, but for the integral of the noise
         noise = threshold * (times[min(onset + 1, times.size - 1)] - times[onset])
         slow = np.abs(signed) <= 0.1 * np.maximum.accumulate(np.abs(signed)) + noise
         turned = (
@@ -153,7 +155,7 @@ def onset_acceleration(table: Floats, block: Floats, slide: slice, threshold: fl
     if rising.size < 3:
         return float(table[slide.start])
     start = np.polynomial.Polynomial.fit(relative[rising], table[rising], 1)(0.0)
-    # r need not grow in a straight line: no further back than the samples before
+    # r may not grow in a straight line: the onset is no earlier than two samples before
     return float(np.clip(start, *sorted((table[max(slide.start - 2, 0)], table[rising[0]]))))
 
 

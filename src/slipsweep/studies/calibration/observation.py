@@ -34,16 +34,18 @@ Forward = Callable[[Floats, Floats], Mapping[str, Floats]]
 #: Parameters that are estimated, in the order of all vectors.
 SOUGHT = ("yield_acceleration", "decay_rate", "delta_mu")
 
-#: Standard deviation of an offset, drift or step, in parts of a channel's largest value: no bound,
-#: in effect.
+#: Standard deviation of an offset, drift or step, in parts of a channel's largest value: so large
+#: that it sets no bound.
 _LARGE = 3.0
 
-#: Samples at rest at least that show the noise of a sensor.
+#: Fewest samples at rest that show the noise of a sensor.
 _AT_REST = 20
 
-#: Intervals of sampling to either side of a jump that are left out; consecutive samples, and
-#: standard deviations of the noise, by which a block slips upslope.
+#: Samples nearer to a jump than so many intervals of sampling are left out.
 _BESIDE_A_JUMP = 1.6
+
+#: A block slips upslope where so many consecutive samples of its velocity lie below zero by more
+#: than so many standard deviations of the noise.
 _UPSLOPE_SAMPLES = 4
 _UPSLOPE_NOISE = 5.0
 
