@@ -137,16 +137,9 @@ class Observation:
             scatter = np.fmax(scatter, np.nanstd(at_rest, axis=1))
         self.sensor_noise = np.where(np.isnan(self.stated_noise), scatter, self.stated_noise)
         self.colour = np.zeros(len(self.channels))
-        self.lines: list[Line] = []
-        self.table_lines: list[Line] = []
-        since = (test.times - test.times[0]) / (test.times[-1] - test.times[0])
-        for name, values in test.channels.items():
-            size = 1.0 if name == TABLE else _LARGE * float(np.nanmax(np.abs(values)))
-            lines = self.table_lines if name == TABLE else self.lines
-            if name in offsets or name in self.drifts:
-                lines.append(Line("offset", name, size, np.full(since.size, size)))
-            if name in self.drifts:
-                lines.append(Line("drift", name, size, size * since))
+        lines = _lines_of(test, offsets, self.drifts)
+        self.lines = [line for line in lines if line.channel != TABLE]
+        self.table_lines = [line for line in lines if line.channel == TABLE]
         columns = [
             np.interp(self.motion.times, test.times, line.values) for line in self.table_lines
         ]
@@ -262,6 +255,19 @@ class Observation:
                 name = f"upslope slip at {times[slip.start]:.4g} s"
                 step = size * (times > times[slip.stop - 1])
                 self.lines.append(Line(name, "relative_displacement", size, step))
+
+
+def _lines_of(test: ShakingTest, offsets: Sequence[str], drifts: Sequence[str]) -> list[Line]:
+    """Return offsets and drifts of channels; a channel that drifts has an offset, too."""
+    lines = []
+    since = (test.times - test.times[0]) / (test.times[-1] - test.times[0])
+    for name, values in test.channels.items():
+        size = 1.0 if name == TABLE else _LARGE * float(np.nanmax(np.abs(values)))
+        if name in offsets or name in drifts:
+            lines.append(Line("offset", name, size, np.full(since.size, size)))
+        if name in drifts:
+            lines.append(Line("drift", name, size, size * since))
+    return lines
 
 
 def _weights_of(values: Floats) -> Floats:
