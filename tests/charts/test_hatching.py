@@ -8,9 +8,10 @@ import pytest
 import xarray as xr
 
 import slipsweep
-from slipsweep.charts import maps, solved, style
+from slipsweep.charts import maps, style
 from slipsweep.charts.slices import Result
 from slipsweep.model.variables import NOTES
+from slipsweep.studies.cautions import unsound_texts
 from tests.support.charts import (
     LINED_SINE,
     SINE,
@@ -123,7 +124,7 @@ def test_shares_of_what_is_unsound_are_those_of_all_cells() -> None:
     result = slipsweep.sweep(*axes)
     slides = result.permanent_displacement.where(~slipsweep.flags(result).not_recoupled) > 0
     estimated = slides & (result.sliding_mode == 2) & slipsweep.flags(result).friction_estimated
-    trends, continuous = solved.unsound_texts(result)
+    trends, continuous = unsound_texts(result)
     share, counted = re.findall(
         r"^([\d.]+) % .* \(counted in (\d+) cells, evenly spaced\)$", continuous
     )[0]

@@ -10,9 +10,9 @@ import xarray as xr
 
 import slipsweep
 from slipsweep import InputError, cli
-from slipsweep.studies.calibration.calibrate import sweep_file_text
-from slipsweep.studies.calibration.estimate import Search
 from slipsweep.studies.calibration.noise import flat_top, noisy_flat_top
+from slipsweep.studies.calibration.search import Search
+from slipsweep.studies.calibration.sweep_tables import sweep_file_text
 from tests.support.shaking import CALIBRATED, SOUGHT, coulomb, digitised, exact, measured
 
 #: The issue's case: with this motion of 3.2 m/s² Üy holds the block, or Eq. 4 crosses at the same

@@ -11,13 +11,22 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from slipsweep.charts import equations, solved, style
+from slipsweep.charts import equations, style
 from slipsweep.charts.sheet import Panel, Sheet, curve_looks, log_axis, log_ticks, plot_curve
 from slipsweep.charts.slices import Result
 from slipsweep.charts.style import Look
 from slipsweep.errors import InputError
 from slipsweep.model.options import MODELS, Mendez, Model, Newmark
 from slipsweep.model.variables import CAUTIONS, STRENGTHS, has_signed_displacements
+from slipsweep.studies.boundaries import has_flags
+from slipsweep.studies.cautions import reliable
+from slipsweep.studies.solved_again import (
+    DISPLACEMENT,
+    DRIVES,
+    is_newmark,
+    is_recorded,
+    solve_again,
+)
 
 Curve = tuple[style.Floats, style.Floats]
 
@@ -55,13 +64,13 @@ _DECAYS: dict[str, tuple[dict[str, Any], Look]] = {
 def families(result: Result, options: style.Options) -> Figure:
     """Curves of a result over one axis, one for each value of another, with Newmark's of displacements."""
     first = ("frequency", "yield_coefficient", "mu_s", "theta", *result.wide)
-    sheet = result.sheet(options, result.compared(options.variable), solved.DRIVES, curves=first)
+    sheet = result.sheet(options, result.compared(options.variable), DRIVES, curves=first)
     return _drawn(sheet, options.variable)
 
 
 def curve(result: Result, options: style.Options) -> Figure:
     """One curve of a result over one axis, with Newmark's of a displacement."""
-    first = (*solved.DRIVES, "yield_coefficient", "frequency")
+    first = (*DRIVES, "yield_coefficient", "frequency")
     return _drawn(result.sheet(options, result.compared(options.variable), first), options.variable)
 
 
@@ -69,25 +78,25 @@ def motions(result: Result, options: style.Options) -> Figure:
     """Displacements under one record over one axis, a curve for each value of another."""
     first = (*STRENGTHS, "yield_acceleration", "yield_coefficient")
     others = [dim for dim in result.wide if dim != "polarity"]
-    sheet = result.sheet(options, result.compared(solved.DISPLACEMENT), first, curves=others)
-    return _drawn(sheet, solved.DISPLACEMENT)
+    sheet = result.sheet(options, result.compared(DISPLACEMENT), first, curves=others)
+    return _drawn(sheet, DISPLACEMENT)
 
 
 def dimensionless(result: Result, options: style.Options) -> Figure:
     """uω²/A against A/Üy, which does not depend on the frequency."""
-    if options.x not in (None, *solved.DRIVES):
+    if options.x not in (None, *DRIVES):
         raise InputError(
             f"{result.name}: --x {options.x}: the dimensionless chart is drawn over A / Üy"
         )
-    drive = next((dim for dim in reversed(solved.DRIVES) if dim in result.wide), None)
+    drive = next((dim for dim in reversed(DRIVES) if dim in result.wide), None)
     if drive is None:
         raise InputError(
             f"{result.name}: the dimensionless chart needs an amplitude of two values or more"
         )
     first = ("mu_s", "theta", "yield_acceleration", "yield_coefficient")
-    names = result.compared(solved.DISPLACEMENT)
+    names = result.compared(DISPLACEMENT)
     sheet = result.sheet(replace(options, x=None), names, drive, curves=first, same=["frequency"])
-    return _drawn(sheet, solved.DISPLACEMENT, scaled=True)
+    return _drawn(sheet, DISPLACEMENT, scaled=True)
 
 
 def _drawn(sheet: Sheet, name: str, scaled: bool = False) -> Figure:
@@ -142,20 +151,18 @@ def spread(result: Result, options: style.Options) -> Figure:
         raise InputError(
             f"{result.name}: the block slides both ways: the other options slide downslope only"
         )
-    sheet = result.sheet(options, result.compared(solved.DISPLACEMENT), solved.DRIVES)
+    sheet = result.sheet(options, result.compared(DISPLACEMENT), DRIVES)
     # the others have a mode limit, whatever this one is
-    sheet.show(solved.DISPLACEMENT, "Barred, of this result", always=True)
+    sheet.show(DISPLACEMENT, "Barred, of this result", always=True)
     sheet.data["drawn"] = sheet.data["drawn"] * 1000.0
     own = MODELS.from_attributes(sheet.data.attrs)
     looks = {}
     flags = []
     for text, model, changed, look in _alternatives(own):
-        answer = solved.solve(
-            sheet.data, [solved.DISPLACEMENT, "validity"], model, **changed
-        ).reset_coords(drop=True)
-        sheet.data[text] = (
-            solved.reliable(answer, solved.DISPLACEMENT, options.show_cautions) * 1000.0
+        answer = solve_again(sheet.data, [DISPLACEMENT, "validity"], model, **changed).reset_coords(
+            drop=True
         )
+        sheet.data[text] = reliable(answer, DISPLACEMENT, options.show_cautions) * 1000.0
         looks[text] = {"linewidth": 1.0, "markersize": 3.5, **look}
         flags.append(answer["validity"])
     text = f"this result:\n{_own_text(own, sheet.data)}"
@@ -178,7 +185,7 @@ def spread(result: Result, options: style.Options) -> Figure:
             )
         _underlay(sheet, panel)
         _mark_accelerations(sheet, panel)
-    sheet.note_left_out(solved.DISPLACEMENT, *flags)
+    sheet.note_left_out(DISPLACEMENT, *flags)
     sheet.note(
         "All results have the same Üy; λ = 2 to 3 is what the paper measured on its interface."
     )
@@ -235,9 +242,7 @@ def _curves(panel: Panel, array: xr.DataArray, gaps: bool = True) -> list[Curve]
 def _draw(sheet: Sheet, panel: Panel, curve: Curve, member: int, members: int, look: Look) -> None:
     """Draw a curve of a family, its jumps as dotted lines."""
     xs, ys = curve
-    text = panel.member(member) or (
-        style.NEWMARK if solved.is_newmark(panel.data) else "this result"
-    )
+    text = panel.member(member) or (style.NEWMARK if is_newmark(panel.data) else "this result")
     sheet.legend[text] = plot_curve(panel.axes, xs, ys, member / members, label=text, **look)
     for at in np.flatnonzero(np.isnan(ys[1:-1]) & (xs[1:-1] == xs[2:])) + 1:
         ends = [at - 1, at + 1]
@@ -261,9 +266,9 @@ def _draw_newmark(sheet: Sheet, panel: Panel, looks: list[Look]) -> None:
 def _underlay(sheet: Sheet, panel: Panel) -> None:
     """Put a broad grey line under what a caution is about, and a barred one under what no block does."""
     drawn = panel.data["drawn"]
-    flagged = (drawn > 0) & solved.has_flags(panel.data["validity"], CAUTIONS)
+    flagged = (drawn > 0) & has_flags(panel.data["validity"], CAUTIONS)
     seen = sheet.data["validity"].where(sheet.data["drawn"] > 0)
-    words = [style.FLAG_TEXT[flag] for flag in CAUTIONS if solved.has_flags(seen, flag).any()]
+    words = [style.FLAG_TEXT[flag] for flag in CAUTIONS if has_flags(seen, flag).any()]
     marks = [("caution", "\n".join(words), _CAUTION, flagged)]
     if "unsound" in panel.data:
         text = style.UNSOUND if "newmark" in panel.data else "falls with A"
@@ -282,7 +287,7 @@ def _mark_accelerations(sheet: Sheet, panel: Panel) -> None:
     if (
         panel.x in ("yield_coefficient", "yield_acceleration")
         and "amplitude" in data
-        and not solved.is_recorded(data)
+        and not is_recorded(data)
     ):
         scale = (
             1 / panel.g if panel.x == "yield_coefficient" else panel.options.scale(panel.x, panel.g)

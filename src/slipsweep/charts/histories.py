@@ -13,9 +13,10 @@ from matplotlib.patches import Patch
 from slipsweep.charts import style
 from slipsweep.charts.sheet import Drawing
 from slipsweep.charts.slices import Result
-from slipsweep.charts.solved import slides_back_text, thresholds
 from slipsweep.charts.style import BLUE, VERMILION, Look, Options
 from slipsweep.model.variables import SlidingMode
+from slipsweep.studies.boundaries import thresholds
+from slipsweep.studies.cautions import slides_back_text
 
 #: How the half waves of a record are drawn: told apart in grey, too.
 _MODES: dict[SlidingMode, Look] = {

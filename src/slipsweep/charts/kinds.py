@@ -17,7 +17,6 @@ from slipsweep.charts import (
     histories,
     limits,
     maps,
-    solved,
     statistics,
     style,
     suites,
@@ -29,6 +28,8 @@ from slipsweep.files.opening import values_text
 from slipsweep.files.selection import At, own_names
 from slipsweep.model.options import MODELS, changing_strength
 from slipsweep.model.variables import PARAMETERS, Validity, has_signed_displacements
+from slipsweep.studies.cautions import LEFT_OUT, unsound_texts
+from slipsweep.studies.solved_again import DISPLACEMENT, is_newmark, is_recorded
 
 Draw = Callable[[Result, Options], Figure]
 
@@ -95,16 +96,14 @@ def fitting(result: Result, options: Options) -> list[str]:
         return [
             kind for kind in kinds if kind != "sensitivity" or "total_index" in result.variables
         ]
-    if solved.DISPLACEMENT not in result.variables:
+    if DISPLACEMENT not in result.variables:
         return ["modes"]
     free = [dim for dim in result.groups if dim not in (*options.at, *options.panels)]
     if len(free) == 1:
         several = any(len(places) > 1 for places in result.places(options.at).values())
         return ["families"] if several or options.panels else ["curve"]
     unfit = {"curve"}
-    if solved.is_newmark(
-        result.data
-    ):  # the ratio is 1, and without θ and μs there are no other options
+    if is_newmark(result.data):  # the ratio is 1, and without θ and μs there are no other options
         unfit |= {"newmark"}
         if "yield_coefficient" in result.data.coords or has_signed_displacements(result.attrs):
             unfit |= {"spread"}
@@ -120,10 +119,8 @@ def draw(result: Result, kind: str | None, options: Options) -> Figure:
         raise InputError(
             f"{result.name}: --kind {kind}: is {SORTS[result.sort][0]}: must be {allowed}"
         )
-    if options.equations and (
-        kind not in equations.KINDS or options.variable != solved.DISPLACEMENT
-    ):
-        drawn = f"--kind {', '.join(equations.KINDS)}, of {solved.DISPLACEMENT}"
+    if options.equations and (kind not in equations.KINDS or options.variable != DISPLACEMENT):
+        drawn = f"--kind {', '.join(equations.KINDS)}, of {DISPLACEMENT}"
         raise InputError(f"{result.name}: --equations: not with --kind {kind}: only with {drawn}")
     for name in ("at", "x", "y", "panels", "levels"):
         if getattr(options, name) and not result.dims:
@@ -199,30 +196,30 @@ def title_page(result: Result) -> Figure:
         for name, text in names.items()
         if name in coords
     ]
-    is_newmark = solved.is_newmark(result.data)
+    of_newmark = is_newmark(result.data)
     flags = [flag for flag in maps.HATCHES if flag not in _STRENGTH_FLAGS]
-    if is_newmark:
+    if of_newmark:
         changes = changing_strength(MODELS.from_attributes(attributes)) is not None
         flags = [*_NEWMARK_FLAGS, *(_STRENGTH_FLAGS if changes else ())]
     compared = [
         "one interface (μs 0.38), two shaking-table tests: θ 5 and 6°, 0.36 and 0.52 g, 1.8 and 3.5 Hz"
     ]
-    if solved.is_recorded(result.data):
+    if is_recorded(result.data):
         compared.append("none under recorded motions: the rules for them extend the paper")
     sections = {
         "Results": [f"{name}: {style.SHOWN[name]['long_name']}" for name in result.variables],
         "Inputs": [*inputs, *filter(None, [style.drawn_text(attributes)])],
         "Model and estimates": style.model_text(attributes).splitlines(),
     }
-    if not is_newmark:
+    if not of_newmark:
         sections["Range in which the model was compared with measurements"] = compared
-    if unsound := solved.unsound_texts(result.data):
+    if unsound := unsound_texts(result.data):
         sections["Unsound"] = unsound
-    if not solved.is_recorded(result.data):
+    if not is_recorded(result.data):
         left_out = "; left out of contours and curves unless their caption says that it is drawn"
         sections["Flags that the charts hatch"] = [
             f"{style.FLAG_TEXT[flag]}: {style.flag_name(flag)} ({flag.kind}): {flag.text}"
-            f"{left_out if flag in solved.LEFT_OUT else ''}"
+            f"{left_out if flag in LEFT_OUT else ''}"
             for flag in maps.HATCHES
             if flag in flags
         ]

@@ -24,14 +24,15 @@ from matplotlib.ticker import FixedFormatter
 from scipy import ndimage
 from scipy.spatial import KDTree
 
-from slipsweep.charts import regions, solved, style
+from slipsweep.charts import regions, style
 from slipsweep.charts.regions import Cells
 from slipsweep.charts.sheet import Panel, Sheet
 from slipsweep.charts.slices import Result
-from slipsweep.charts.solved import DISPLACEMENT, DRIVES, has_flags, is_newmark
 from slipsweep.charts.style import Floats, Look, Options
 from slipsweep.errors import InputError
 from slipsweep.model.variables import RESULTS, VALUELESS, SlidingMode, Validity
+from slipsweep.studies.boundaries import boundaries, has_flags
+from slipsweep.studies.solved_again import DISPLACEMENT, DRIVES, is_newmark
 
 #: Colour and hatch of each mode: from light to dark.
 MODES = {
@@ -168,7 +169,7 @@ def _sheet(result: Result, options: Options, names: list[str], across: Sequence[
     sheet = result.sheet(options, names, across, y=DRIVES, same=[] if varies else ["frequency"])
     sheet.show(names[0], f"Hatched {UNSOUND_HATCH}")
     # the lines go on to where the block slides under its own weight, which is drawn over them
-    sheet.data = sheet.data.assign(solved.boundaries(sheet.data))
+    sheet.data = sheet.data.assign(boundaries(sheet.data))
     for panel in sheet.panels:
         panel.axes.set_facecolor(NO_VALUE)
     for panel, (name, (text, look)) in itertools.product(sheet.panels, style.LINES.items()):

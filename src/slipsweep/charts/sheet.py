@@ -18,13 +18,24 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from slipsweep.charts import solved, style
+from slipsweep.charts import style
+from slipsweep.charts.magnitudes import UPSLOPE_SHARE
 from slipsweep.charts.style import Floats, Look, Options
 from slipsweep.errors import InputError
 from slipsweep.files.selection import axis_labels, axis_numbers
 from slipsweep.model.variables import Validity
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
+from slipsweep.studies.boundaries import has_flags, thresholds
+from slipsweep.studies.cautions import (
+    LEFT_OUT,
+    SLIDES_BACK,
+    estimated_friction_text,
+    percent,
+    reliable,
+    unsound,
+)
+from slipsweep.studies.solved_again import DISPLACEMENT, is_newmark, newmark_displacement
 from slipsweep.studies.upslope import sliding_ways
 
 #: Dashes and markers of the curves of a family, and how many markers a curve has.
@@ -316,36 +327,36 @@ class Sheet(Drawing):
         """Say which unreliable values are left out or drawn on request; displacements upslope have no logarithm."""
         validities = [*others, *([self.data["validity"]] if "validity" in self.data else [])]
         groups: dict[str, list[Validity]] = {}
-        for flag in solved.LEFT_OUT:
-            if any(solved.has_flags(one, flag).any() for one in validities):
+        for flag in LEFT_OUT:
+            if any(has_flags(one, flag).any() for one in validities):
                 drawn = self.options.show_cautions and not (
-                    name == solved.DISPLACEMENT and flag == Validity.UPSLOPE
+                    name == DISPLACEMENT and flag == Validity.UPSLOPE
                 )
                 groups.setdefault("Drawn on request" if drawn else "Left out", []).append(flag)
         for heading, flags in groups.items():
-            texts = " or ".join(solved.LEFT_OUT[flag] for flag in flags)
+            texts = " or ".join(LEFT_OUT[flag] for flag in flags)
             words = ", ".join(style.FLAG_TEXT[flag] for flag in flags)
             self.note(f"{heading}: values flagged {texts}.", f"{heading}: {words}.")
 
     def note_slides_back(self, motion: Record | Suite | None) -> None:
         """Say of how many sliding cells the block would also slide upslope, which is left out."""
-        shown = solved.reliable(self.data, solved.DISPLACEMENT, self.options.show_cautions) > 0
+        shown = reliable(self.data, DISPLACEMENT, self.options.show_cautions) > 0
         ways = sliding_ways(self.data, motion)
         if ways is not None and (shown & ways[1]).any():
-            percent = solved.percent(int((shown & ways[1]).sum()) / int(shown.sum()))
+            share = percent(int((shown & ways[1]).sum()) / int(shown.sum()))
             self.note(
-                f"In {percent} of the sliding cells shown {solved.SLIDES_BACK}.",
-                f"{percent} would also slide upslope: displacement too large.",
+                f"In {share} of the sliding cells shown {SLIDES_BACK}.",
+                f"{share} would also slide upslope: displacement too large.",
             )
 
     def note_magnitude(self) -> None:
         """Say that displacements are drawn without their signs, if they have signs."""
-        share = self.data.attrs.get(solved.UPSLOPE_SHARE)
+        share = self.data.attrs.get(UPSLOPE_SHARE)
         if share is not None:
-            percent = solved.percent(share)
+            text = percent(share)
             self.note(
-                f"Drawn is |u|: {percent} of the sliding cells shown end upslope, u < 0.",
-                f"|u|: {percent} end upslope.",
+                f"Drawn is |u|: {text} of the sliding cells shown end upslope, u < 0.",
+                f"|u|: {text} end upslope.",
             )
 
     def show(self, name: str, marked: str, always: bool = False) -> None:
@@ -355,11 +366,11 @@ class Sheet(Drawing):
         Newmark's block, and ``unsound``, where there is a trend that no block has.  Notes compare
         the two, and say how much is `marked`.
         """
-        drawn = solved.reliable(self.data, name, self.options.show_cautions)
-        self.data = self.data.merge(solved.thresholds(self.data, always)).assign(drawn=drawn)
-        if name != solved.DISPLACEMENT or solved.is_newmark(self.data):
+        drawn = reliable(self.data, name, self.options.show_cautions)
+        self.data = self.data.merge(thresholds(self.data, always)).assign(drawn=drawn)
+        if name != DISPLACEMENT or is_newmark(self.data):
             return
-        theirs = solved.newmark(self.data)
+        theirs = newmark_displacement(self.data)
         if theirs is not None:
             self.data["newmark"] = theirs.reset_coords(drop=True)
             ratio = (drawn / theirs).where(lambda one: np.isfinite(one) & (one > 0))
@@ -371,16 +382,16 @@ class Sheet(Drawing):
                     f"90 % of the sliding cells shown lie between {low:.3g} and {high:.3g}.",
                     short="",
                 )
-        self.data["unsound"], trends = solved.unsound(self.data, drawn, theirs)
+        self.data["unsound"], trends = unsound(self.data, drawn, theirs)
         if trends:
-            share = solved.percent(int(self.data["unsound"].sum()) / int((drawn > 0).sum()))
+            share = percent(int(self.data["unsound"].sum()) / int((drawn > 0).sum()))
             self.note(
                 f"{marked}: {share} of the sliding cells shown. {trends[0].upper()}{trends[1:]}.",
                 f"{marked}: {share} of the sliding cells, a trend that no block has.",
             )
         if "limit_line" in self.data and "validity" in self.data:
             continuous = self.data["amplitude"] > self.data["limit_line"]
-            text = solved.estimated(self.data, drawn, continuous.reset_coords(drop=True))
+            text = estimated_friction_text(self.data, drawn, continuous.reset_coords(drop=True))
             if text:
                 self.note(f"{text}.", f"{text}.".replace(" of the sliding cells", ""))
 

@@ -8,20 +8,20 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from slipsweep.charts.magnitudes import by_magnitude
 from slipsweep.charts.sheet import Sheet
-from slipsweep.charts.solved import (
-    DISPLACEMENT,
-    by_magnitude,
-    is_newmark,
-    is_recorded,
-    solve,
-    with_amplitude,
-)
 from slipsweep.charts.style import SHOWN, Options, check_attributes
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.motions import read_embedded
 from slipsweep.files.selection import At, Place, axis_labels, between, find
 from slipsweep.model.variables import PARAMETERS, STATISTIC_COORDINATES, STATISTICS
+from slipsweep.studies.solved_again import (
+    DISPLACEMENT,
+    is_newmark,
+    is_recorded,
+    solve_again,
+    with_amplitude,
+)
 
 #: Dimensions whose places have names, and no order.
 NAMED = ("case", "motion")
@@ -208,7 +208,7 @@ class Result:
         if solved and self.sort != "sweep" and self.motion is None:
             self.result(solved[0])
         if solved:
-            data = data.assign(solve(data, solved, motion=self.motion).data_vars)
+            data = data.assign(solve_again(data, solved, motion=self.motion).data_vars)
         return by_magnitude(data.assign_attrs(picked=picked))
 
     def spread(self, dim: str, number: int) -> list[Place]:

@@ -9,11 +9,11 @@ from matplotlib.patches import Patch
 from slipsweep.charts import style
 from slipsweep.charts.sheet import Sheet, curve_looks, log_axis, plot_curve
 from slipsweep.charts.slices import Result
-from slipsweep.charts.solved import DRIVES
 from slipsweep.charts.style import BLUE, VERMILION, Look, Options
 from slipsweep.errors import InputError
 from slipsweep.files.selection import axis_labels
 from slipsweep.model.variables import PARAMETERS, STRENGTHS, SensitivityStatus
+from slipsweep.studies.solved_again import DRIVES
 
 #: What statistics are drawn over, in order of preference.
 _AXES = (*DRIVES, *STRENGTHS)

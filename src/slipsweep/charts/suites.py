@@ -13,12 +13,15 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from slipsweep.charts import equations, solved, statistics, style
+from slipsweep.charts import equations, statistics, style
 from slipsweep.charts.sheet import Panel, Sheet, log_axis, log_ticks, plot_curve
 from slipsweep.charts.slices import Result
 from slipsweep.charts.style import Floats, Look, Options
 from slipsweep.errors import InputError
 from slipsweep.model.variables import CAUTIONS, INTENSITY_MEASURES, STRENGTHS
+from slipsweep.studies.boundaries import has_flags
+from slipsweep.studies.cautions import percent, reliable
+from slipsweep.studies.solved_again import DISPLACEMENT
 from slipsweep.studies.suite_statistics import SUITE, THRESHOLDS, suite_statistics, without_rounding
 
 #: Powers of the factor and of the time scale that an intensity measure of a motion as recorded
@@ -47,9 +50,9 @@ _BARS: Look = {"facecolor": "0.85", "edgecolor": "black", "linewidth": 1.0}
 def motions(result: Result, options: Options) -> Figure:
     """Displacements over one axis: a thin line for each motion, median and 16 to 84 % band, and Newmark's median."""
     sheet = _sheet(result, options)
-    sheet.show(solved.DISPLACEMENT, "Not marked")
+    sheet.show(DISPLACEMENT, "Not marked")
     if options.show_cautions:  # upslope ones lie below the axis, as zeros do
-        sheet.data["drawn"] = sheet.data[solved.DISPLACEMENT]
+        sheet.data["drawn"] = sheet.data[DISPLACEMENT]
     for panel in sheet.panels:
         floor = log_axis(panel.axes, _millimetres(sheet.data), _label(sheet), zeros=True)
         lines = (
@@ -57,14 +60,14 @@ def motions(result: Result, options: Options) -> Figure:
         )
         draw_suite(sheet, panel.axes, panel.xs, lines, _band(panel.data, panel.x), floor)
         if "newmark_displacement" in panel.data:
-            theirs = panel.data.assign({solved.DISPLACEMENT: panel.data["newmark_displacement"]})
+            theirs = panel.data.assign({DISPLACEMENT: panel.data["newmark_displacement"]})
             median = np.maximum(_band(theirs, panel.x)[1], floor)
             sheet.legend[f"median, {style.NEWMARK}"] = panel.axes.plot(
                 panel.xs, median, gid="newmark", **_NEWMARK
             )[0]
         equations.draw_over_axis(sheet, panel)
     _note_suite(sheet, "Median and band are of", "they lie below the logarithmic axis")
-    sheet.note_left_out(solved.DISPLACEMENT)
+    sheet.note_left_out(DISPLACEMENT)
     _note_cautions(sheet)
     return sheet.done()
 
@@ -113,7 +116,7 @@ def intensity(result: Result, options: Options) -> Figure:
     if missing := np.count_nonzero(~np.isfinite(places)):
         sheet.note(f"{missing} of {places.size} have no {text}: the samples resolve none.")
     _note_suite(sheet, "Drawn are", "they are marked at the lower edge")
-    sheet.note_left_out(solved.DISPLACEMENT)
+    sheet.note_left_out(DISPLACEMENT)
     return sheet.done()
 
 
@@ -175,12 +178,10 @@ def _sheet(
         for dim in (*STRENGTHS, "yield_acceleration", "yield_coefficient", *result.wide)
         if dim not in SUITE
     ]
-    sheet = result.sheet(
-        options, [*result.compared(solved.DISPLACEMENT), *more], x or axes, keep=SUITE
-    )
-    given = sheet.data[solved.DISPLACEMENT]
-    rounded = without_rounding(sheet.data[solved.DISPLACEMENT])
-    sheet.data[solved.DISPLACEMENT] = rounded
+    sheet = result.sheet(options, [*result.compared(DISPLACEMENT), *more], x or axes, keep=SUITE)
+    given = sheet.data[DISPLACEMENT]
+    rounded = without_rounding(sheet.data[DISPLACEMENT])
+    sheet.data[DISPLACEMENT] = rounded
     if not rounded.equals(given):
         sheet.note("Displacements below 10⁻¹² m count as zero.")
     return sheet
@@ -233,7 +234,7 @@ def _label(sheet: Sheet) -> str:
 
 
 def _millimetres(data: xr.Dataset) -> Floats:
-    values = data[solved.DISPLACEMENT].values.ravel() * 1000.0
+    values = data[DISPLACEMENT].values.ravel() * 1000.0
     return np.asarray(values[np.isfinite(values)], np.float64)
 
 
@@ -244,15 +245,15 @@ def _scattered(panel: Panel, measure: str) -> Floats:
     factor = np.abs(data["scale"] if "scale" in data.coords else data["motion_factor"])
     time = data["time_scale"] if "time_scale" in data.coords else 1.0
     xs = data[f"motion_{measure}"] * factor**power * time**time_power
-    ys = solved.reliable(data, solved.DISPLACEMENT, panel.options.show_cautions) * 1000.0
+    ys = reliable(data, DISPLACEMENT, panel.options.show_cautions) * 1000.0
     every = np.array([one.values.ravel() for one in xr.broadcast(xs, ys, data["polarity"])])
     return every[:, np.isfinite(every[1])]
 
 
 def _sliding_left_out(sheet: Sheet) -> int:
     """Number of motions of all panels that slide and are not drawn, as their displacements are unreliable."""
-    moved = sheet.data[solved.DISPLACEMENT]
-    drawn = solved.reliable(sheet.data, solved.DISPLACEMENT, sheet.options.show_cautions)
+    moved = sheet.data[DISPLACEMENT]
+    drawn = reliable(sheet.data, DISPLACEMENT, sheet.options.show_cautions)
     return int((moved.notnull() & (moved != 0.0) & drawn.isnull()).sum())
 
 
@@ -288,7 +289,7 @@ def _note_suite(sheet: Sheet, what: str, zeros_are: str = "") -> None:
         if most
         else "all have a value"
     )
-    sheet.note(f"{what} {suite_text(sheet.data[solved.DISPLACEMENT].sizes)}; {left}.")
+    sheet.note(f"{what} {suite_text(sheet.data[DISPLACEMENT].sizes)}; {left}.")
     zeros = (found["zero_probability"].fillna(0.0) * found["value_count"]).values
     if zeros_are and zeros.max() > 0:
         count = found["value_count"].values.flat[np.argmax(zeros)]
@@ -298,10 +299,8 @@ def _note_suite(sheet: Sheet, what: str, zeros_are: str = "") -> None:
 
 def _note_cautions(sheet: Sheet) -> None:
     """Which cautions the statistics have in them."""
-    shares = {
-        flag: float(solved.has_flags(sheet.data["validity"], flag).mean()) for flag in CAUTIONS
-    }
-    seen = {flag: solved.percent(share) for flag, share in shares.items() if share}
+    shares = {flag: float(has_flags(sheet.data["validity"], flag).mean()) for flag in CAUTIONS}
+    seen = {flag: percent(share) for flag, share in shares.items() if share}
     if seen:
         names = ", ".join(f"{style.flag_name(flag)} {share}" for flag, share in seen.items())
         words = ", ".join(f"{style.FLAG_TEXT[flag]} {share}" for flag, share in seen.items())

@@ -135,7 +135,8 @@ def calibrate(
     paths = outputs.check_outputs(
         output, overwrite, reads=tests, endings=(".nc", ".toml", *FIGURES)
     )
-    from slipsweep.studies.calibration.calibrate import calibrate, sweep_file_text
+    from slipsweep.studies.calibration.calibrate import calibrate
+    from slipsweep.studies.calibration.sweep_tables import sweep_file_text
 
     table = calibrate(tests, **given, model=model, cycles=cycles)
     text = sweep_file_text(table.attrs["model_table"], table.attrs["uncertainty_table"])
@@ -182,7 +183,7 @@ def _echo_parameters(table: "xr.Dataset") -> None:
     import pandas as pd
 
     from slipsweep.motion.shaking import RESPONSES
-    from slipsweep.studies.calibration.likelihood import SOUGHT
+    from slipsweep.studies.calibration.observation import SOUGHT
 
     # no value where the data do not determine one
     rows = [

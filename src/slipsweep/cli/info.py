@@ -28,11 +28,11 @@ def info(
     magnitude: options.Magnitude = None,
 ) -> None:
     """Show what a result holds, how it was made, its shares of flags, and the statistics of a suite."""
-    from slipsweep.charts import solved
     from slipsweep.files import jobs, motions, opening, selection, storing
     from slipsweep.grid.tally import tally_of
     from slipsweep.motion.records import Record
     from slipsweep.motion.suites import Suite
+    from slipsweep.studies.cautions import slides_back_text
 
     beside = options.compared(equations, magnitude)
     table = opening.read_result(file)
@@ -57,7 +57,7 @@ def info(
     except InputError as error:
         echo(f"modes and flags not counted: {error}")
     common.echo_unsound(table)
-    if slides_back := solved.slides_back_text(table, recorded):
+    if slides_back := slides_back_text(table, recorded):
         echo(f"caution: {slides_back}")
     has_statistics = table.sizes.get("motion", 1) > 1 or "displacement_quantile" in table
     if displacement and not (has_statistics or beside):

@@ -249,8 +249,6 @@ class StrengthPlan(plans.Plan):
     ) -> None:
         self.of = of
         self.problem = problem
-        self.coords = coords
-        self.attrs = attrs
         self.sampling = sampling
         self.quantiles = quantiles if sampling is None else sampling.quantiles
         self.inputs = grid_inputs.inputs_of(problem, coords)
@@ -263,12 +261,9 @@ class StrengthPlan(plans.Plan):
         for dim in over:
             if dim not in sizes:
                 raise InputError(f"uncertainty.over = {parameters.shown(dim)}: is no dimension")
-        pooled = {*over, *(SUITE if "motion" in sizes else ())}
+        of_suite = {*over, *(SUITE if "motion" in sizes else ())}
         #: Dimensions that make up a suite, and the number of samples at each point.
-        self.pooled = {dim: sizes[dim] for dim in sizes if dim in pooled}
-        if self.pooled:
-            self.attrs = attrs | {"pooled": resources.grid_text(self.pooled)}
-        self.sizes = {dim: size for dim, size in sizes.items() if dim not in self.pooled}
+        self.pooled = {dim: sizes[dim] for dim in sizes if dim in of_suite}
         self.draws = 1 if sampling is None else sampling.samples
         self.runs = self.draws * math.prod(self.pooled.values())
         #: Results, and their dimensions in addition to those of the grid.
@@ -280,17 +275,21 @@ class StrengthPlan(plans.Plan):
             self.results[f"required_{of}_quantile"] = ("quantile",)
             self.results["always_within_count"] = ()
             self.results["never_within_count"] = ()
-        self.names = tuple(self.results)
-        plans.check_dimensions(sizes, coords, (*self.names, "quantile"))
-        #: How many points are solved together.
+        plans.check_dimensions(sizes, coords, (*self.results, "quantile"))
+        #: Number of points that are solved together.
         self.points = max(_TOGETHER // self.runs, 1)
-        # as of any plan
-        self.together = ()
-        self.cost = solvers.cost_of(problem) * self.runs * _EVALUATIONS
-        self.cell_memory = 0
-        self.memory = _CELL_MEMORY * max(_TOGETHER, self.runs) + solvers.memory_of(problem)
+        memory = _CELL_MEMORY * max(_TOGETHER, self.runs) + solvers.memory_of(problem)
         if options.slides_both_ways(problem.model):
-            self.memory += SCAN_MEMORY
+            memory += SCAN_MEMORY
+        super().__init__(
+            sizes={dim: size for dim, size in sizes.items() if dim not in self.pooled},
+            coords=coords,
+            tasks=(),
+            names=tuple(self.results),
+            attrs=attrs | ({"pooled": resources.grid_text(self.pooled)} if self.pooled else {}),
+            cost=solvers.cost_of(problem) * self.runs * _EVALUATIONS,
+            memory=memory,
+        )
 
     @property
     def cells(self) -> int:

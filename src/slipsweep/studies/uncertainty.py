@@ -293,6 +293,41 @@ def check_drawn(sampling: Sampling, given: Sequence[str], problem: grid_inputs.P
             )
 
 
+def _check_pooled(
+    sampling: Sampling, sizes: Mapping[str, int], clock_values: xr.Variable | None, clock: str
+) -> None:
+    """Raise InputError for a pooled dimension that the grid lacks, or that the clock varies along.
+
+    `clock` is the frequency or the time scale: the samples of a grid point serve all its values.
+    """
+    for dim in sampling.over:
+        key = f"{sampling.keys}over = {parameters.shown(dim)}"
+        if dim not in sizes:
+            raise InputError(
+                f"{key}: must be a dimension of the grid: {', '.join(sizes) or 'there is none'}"
+            )
+        if clock_values is not None and dim in clock_values.dims:
+            raise InputError(f"{key}: must not be a dimension of {clock}")
+
+
+def _obeys_scaling_law(
+    sampling: Sampling,
+    problem: grid_inputs.Problem,
+    coords: Mapping[str, xr.Variable],
+    clock: str,
+) -> bool:
+    """Return True if u = W/ω² holds with the same W for all frequencies (or time scales).
+
+    It does not hold where the strength of the shaking changes with the time, where an offset is
+    drawn on the frequency, and where friction changes while the block slides.
+    """
+    drawn = sampling.distributions
+    timed = {"displacement_amplitude", "pgv", "arias_intensity"} & {*coords, *drawn}
+    has_offset = clock in drawn and drawn[clock].kind == "offset"
+    changes = options.changing_strength(problem.model) is not None
+    return not (timed or has_offset or changes)
+
+
 class SamplePlan(plans.Plan):
     """The samples of every grid point: cells along `solved` dimensions, frequencies along `scaled` ones.
 
@@ -306,18 +341,14 @@ class SamplePlan(plans.Plan):
         coords: dict[str, xr.Variable],
         attrs: dict[str, Any],
     ) -> None:
-        self.sampling = sampling
-        self.problem = problem
-        self.coords = coords
         is_wave = isinstance(problem.excitation, Waveform)
         drawn = sampling.distributions
         #: Results, and their dimensions in addition to those of the grid.
         self.results = STATISTICS | (SENSITIVITY if sampling.sensitivity else {})
         if not is_wave:
             del self.results["mode_share"]
-        self.names = tuple(self.results)
         clock = "frequency" if is_wave else "time_scale"
-        inputs = self.inputs = grid_inputs.inputs_of(problem, coords)
+        inputs = grid_inputs.inputs_of(problem, coords)
         for angle in variables.ANGLES:
             if angle in coords and angle in drawn:
                 inputs[angle] = coords[angle]
@@ -325,51 +356,50 @@ class SamplePlan(plans.Plan):
             inputs.pop("amplitude", None)  # A = ω²d
         sizes = grid_inputs.grid_sizes(inputs)
         plans.check_dimensions(sizes, coords, _TAKEN)
-        for dim in sampling.over:
-            key = f"{sampling.keys}over = {parameters.shown(dim)}"
-            if dim not in sizes:
-                raise InputError(
-                    f"{key}: must be a dimension of the grid: {', '.join(sizes) or 'there is none'}"
-                )
-            if (
-                clock in coords and dim in coords[clock].dims
-            ):  # the samples of a grid point serve all its frequencies
-                raise InputError(f"{key}: must not be a dimension of {clock}")
-        # strengths that change with the time, f + offset, and friction that changes while the block
-        # slides depend on the frequency itself: no scaling law then
-        unscaled = (
-            bool({"displacement_amplitude", "pgv", "arias_intensity"} & {*coords, *drawn})
-            or (clock in drawn and drawn[clock].kind == "offset")
-            or options.changing_strength(problem.model) is not None
+        _check_pooled(sampling, sizes, coords.get(clock), clock)
+        pooled = {dim: sizes[dim] for dim in sampling.over}
+        points = {dim: size for dim, size in sizes.items() if dim not in pooled}
+        # the dimensions of the grid that the samples depend on
+        scaling = _obeys_scaling_law(sampling, problem, coords, clock)
+        dims = grid_inputs.grid_sizes(
+            {name: values for name, values in inputs.items() if name != clock or not scaling}
         )
-        own = grid_inputs.grid_sizes(
-            {name: one for name, one in inputs.items() if name != clock or unscaled}
-        )
-        self.pooled = {dim: sizes[dim] for dim in sampling.over}
-        self.sizes = {dim: size for dim, size in sizes.items() if dim not in self.pooled}
-        self.scaled = {dim: size for dim, size in self.sizes.items() if dim not in own}
-        self.solved = {dim: size for dim, size in self.sizes.items() if dim in own}
-        #: What displacements are divided by the square of; where it is not 1, cells are solved at
-        #: 1.
+        scaled = {dim: size for dim, size in points.items() if dim not in dims}
+        solved = {dim: size for dim, size in points.items() if dim in dims}
+        #: The variable by whose square displacements are divided.  Where it is not 1, cells are
+        #: solved at a frequency of 1 Hz, or a time scale of 1.
         self.frequency = xr.Variable((), 1.0)
-        if self.scaled:
+        if scaled:
             self.frequency = inputs[clock] if is_wave else 1.0 / inputs[clock]
             inputs[clock] = xr.Variable((), 1.0)
-        self.attrs = attrs | ({"pooled": resources.grid_text(self.pooled)} if self.pooled else {})
-        #: Samples and runs of a grid point, all draws with all that is pooled.
-        self.samples, self.runs = (
-            n * math.prod(self.pooled.values()) for n in (sampling.samples, sampling.runs)
-        )
-        #: How many points are solved together: in 30 MB, yet enough to keep the kernels busy.
+        pooled_values = math.prod(pooled.values())
+        #: Samples and runs of a grid point: all draws with all that is pooled.
+        self.samples = sampling.samples * pooled_values
+        self.runs = sampling.runs * pooled_values
+        #: Number of points that are solved together: in 30 MB, yet enough to keep the kernels busy.
         self.points = max(1_000_000 // self.runs, 1)
-        # as of any plan
-        self.together = tuple(self.scaled)
-        self.cost = max(1.0, solvers.cost_of(problem) * self.runs / math.prod(self.scaled.values()))
-        run = 24 * len(drawn) + self.points * (8 * (2 + len(drawn)) + 11)
-        self.memory = self.runs * run + solvers.memory_of(problem)
+        self.sampling = sampling
+        self.problem = problem
+        self.inputs = inputs
+        self.pooled = pooled
+        self.scaled = scaled
+        self.solved = solved
+        cost = max(1.0, solvers.cost_of(problem) * self.runs / math.prod(scaled.values()))
+        bytes_per_run = 24 * len(drawn) + self.points * (8 * (2 + len(drawn)) + 11)
+        memory = self.runs * bytes_per_run + solvers.memory_of(problem)
         if sampling.sensitivity:
-            self.cost += 30_000  # cells of the cycle solver: the time of the bootstrap
-            self.memory += SOBOL_MEMORY + 64 * sampling.runs
+            cost += 30_000  # cells of the cycle solver: the time of the bootstrap
+            memory += SOBOL_MEMORY + 64 * sampling.runs
+        super().__init__(
+            sizes=points,
+            coords=coords,
+            tasks=(),
+            names=tuple(self.results),
+            attrs=attrs | ({"pooled": resources.grid_text(pooled)} if pooled else {}),
+            cost=cost,
+            together=tuple(scaled),
+            memory=memory,
+        )
 
     @property
     def cells(self) -> int:

@@ -4,7 +4,6 @@ Both models let a block slide downslope only, but for continuous sliding by the 
 level or gentle base a block also slides back, and ends near where it began.
 """
 
-import inspect
 from typing import Any
 
 import numpy as np
@@ -18,10 +17,6 @@ from slipsweep.motion.intensity import strength_factor
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Pair, Suite
 from slipsweep.motion.waveforms import WAVEFORMS, peak_acceleration
-
-#: Equations as they are written: compiled ones take single numbers, and a second to compile.
-_coulomb: Any = inspect.unwrap(equations.coulomb_yield_acceleration)
-_limit_denominator: Any = inspect.unwrap(equations.limit_denominator)
 
 
 def upslope_yield_acceleration(
@@ -73,14 +68,16 @@ def sliding_ways(
     if "yield_acceleration" in data.coords:
         onset = _values(data, "yield_acceleration")
     else:
-        onset = _coulomb(_values(data, "mu_s"), tan_theta, g)
+        onset = xr.apply_ufunc(
+            equations.coulomb_yield_acceleration, _values(data, "mu_s"), tan_theta, g
+        )
     onset = onset.where(onset > 0.0)
     slides = peaks[0] > onset
     slides_back = peaks[1] > upslope_yield_acceleration(onset, theta, g)
     if WAVEFORMS.attribute in data.attrs and data.attrs["model"] == Mendez.name:
         mu_s = _values(data, "mu_s")
         in_contact = _amplitude(data) * tan_theta < g
-        limit = (onset + g * mu_s) / _limit_denominator(mu_s, tan_theta)  # Eq. 7
+        limit = xr.apply_ufunc(equations.limiting_acceleration, onset, mu_s, tan_theta, g)
         slides = slides & in_contact
         slides_back = slides_back & in_contact & ~(_amplitude(data) > limit)
     return slides, slides_back

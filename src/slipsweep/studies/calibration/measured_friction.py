@@ -6,6 +6,7 @@ goes on until the relative velocity, the integral of r from there on, comes back
 below the threshold.  The threshold stands above the noise of r, which is estimated from r itself.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from scipy.stats import t as student
 
 from slipsweep._version import __version__
 from slipsweep.errors import InputError
+from slipsweep.model import equations
 from slipsweep.model.parameters import (
     check_finite,
     check_numbers,
@@ -150,12 +152,10 @@ def free_body_friction(block: Floats, theta: float, g: float) -> Floats:
     return np.asarray(np.tan(np.radians(theta) + np.arctan(block / g)))
 
 
-def eq1_friction(table: Floats, block: Floats, theta: float, mu_s: float, g: float) -> Floats:
-    """μ(t) = tan φs − tan θ − (|Üg| − |Ü| − g tan θ) / (g + Üg tan θ)   (1)"""
-    tan_theta = np.tan(np.radians(theta))
-    return np.asarray(
-        mu_s - tan_theta - (np.abs(table) - np.abs(block) - g * tan_theta) / (g + table * tan_theta)
-    )
+def eq1_friction(table: Any, block: Any, theta: float, mu_s: float, g: float) -> Floats:
+    """Return the friction coefficient by Eq. 1 at recorded accelerations; `theta` in degrees."""
+    tan_theta = math.tan(math.radians(theta))
+    return np.asarray(equations.mobilised_friction(table, block, mu_s, tan_theta, g))
 
 
 def coefficients_of(
@@ -391,12 +391,11 @@ def test_of(given: Any) -> ShakingTest:
 
 
 def check_contact(test: ShakingTest, theta: float, g: float) -> None:
-    """Refuse a test in which the block would lift off."""
+    """Raise InputError for a test in which the block would lift off (Eqs. 2 and 3)."""
     table = test.channels[TABLE]
-    tan_theta = float(np.tan(np.radians(theta)))
     lowest = int(np.argmin(table))
-    if g + table[lowest] * tan_theta <= 0.0:
+    if equations.normal_acceleration(table[lowest], math.tan(math.radians(theta)), g) <= 0.0:
         raise InputError(
-            f"{test.name}: {TABLE} = {table[lowest]:.4g} m/s2 at {test.times[lowest]:.6g} s: the block would lift off "
-            "(g + Üg tan θ must be > 0); are its units right?"
+            f"{test.name}: {TABLE} = {table[lowest]:.4g} m/s2 at {test.times[lowest]:.6g} s: the "
+            "block would lift off (g + Üg tan θ must be > 0); are its units right?"
         )

@@ -17,6 +17,9 @@ from slipsweep.studies.calibration.measured_friction import Floats, noise_of
 #: through samples nor a sensor is better.
 LEAST_NOISE = 1e-4
 
+#: Standard deviation of normal noise over the median of its absolute values.
+OF_MEDIAN = 1.4826
+
 #: Correlations of neighbouring samples of the noise that are tried; by how much −2 ln of the
 #: likelihood falls at least if noise is coloured; variances of the noise that are tried; standard
 #: errors up to which a correlation may be chance.
@@ -131,7 +134,7 @@ def is_first_order(innovations: Floats) -> bool:
     limit = _CHANCE / centred.size**0.5
     lags = range(1, min(_LAGS, centred.size // 4) + 1)
     correlations = [float(centred[lag:] @ centred[:-lag]) / square for lag in lags]
-    typical = 1.4826 * float(np.median(np.abs(centred)))
+    typical = OF_MEDIAN * float(np.median(np.abs(centred)))
     tails = (square / centred.size) ** 0.5 / max(typical, 1e-300)
     return bool(max(map(abs, correlations)) < limit and tails < _TAILS)
 

@@ -1,0 +1,308 @@
+"""Search of the least sum of squares, and of all points that the data allow.
+
+A standard error does not describe a parameter that the data hardly determine.  So the interval of a
+parameter is that of its profile likelihood, the union over the branches of the model
+(`Scale.reading`), each compared with its own least (docs/calibration.md).
+"""
+
+import functools
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import brentq, least_squares
+
+from slipsweep.studies.calibration.measured_friction import QUANTILE, Floats
+from slipsweep.studies.calibration.scale import LEAST, MOST
+
+#: What decides the block's acceleration, of each test.
+Readings = tuple[str, ...]
+
+#: Rise of the sum of squares at the ends of a 95 % interval, and of the least of a branch by which
+#: it is refuted.
+SQUARE = QUANTILE**2
+REFUTED = 9.0
+
+#: Minima that are followed, at this distance in Üy at least in parts of the peak, and the rise of
+#: the sum of squares above the least beyond which none can become the least; the distance from
+#: which on minima are said to be several solutions.
+_MINIMA = 6
+_APART = 0.004
+_HOPELESS = 60.0
+_SEVERAL = 0.02
+
+#: Rise of the least of a branch up to which it may be refuted wrongly.
+_NARROWLY = 20.0
+
+
+class Tried(NamedTuple):
+    """A point that was tried, what decides the block's acceleration there, and the sum of squares.
+
+    `branch` are the readings but for "crossed", which is "held": the least is the same.
+    """
+
+    point: Floats
+    readings: Readings
+    branch: Readings
+    square: float
+
+
+class Search:
+    """Independent residuals and readings (`Scale.reading`) of points, and all points that were tried."""
+
+    def __init__(
+        self,
+        residuals: Callable[[Floats], Floats],
+        readings: Callable[[Floats], Readings],
+        least: Floats = LEAST,
+        most: Floats = MOST,
+    ) -> None:
+        self._residuals = residuals
+        self._readings = readings
+        self._bounds = (least, most)
+        self.tried: list[Tried] = []
+        self.minima: list[Tried] = []
+        self._least: dict[Readings, float] = {}
+
+    def residuals(self, point: Floats) -> Floats:
+        rest = self._residuals(point)
+        readings = self._readings(point)
+        branch = tuple("held" if one == "crossed" else one for one in readings)
+        self.tried.append(Tried(np.array(point), readings, branch, float(rest @ rest)))
+        self._least[branch] = min(self.tried[-1].square, self._least.get(branch, math.inf))
+        return rest
+
+    def at(self, point: Floats) -> Tried:
+        """Try a point."""
+        self.residuals(point)
+        return self.tried[-1]
+
+    def square(self, point: Floats) -> float:
+        """Sum of squares."""
+        return self.at(point).square
+
+    @property
+    def least(self) -> float:
+        return min(self._least.values())
+
+    @property
+    def best(self) -> Floats:
+        return min(self.tried, key=lambda one: one.square).point
+
+    def above(self, one: Tried) -> float:
+        """Sum of squares of a point above the least of its branch; infinite if the branch is refuted."""
+        least = self._least[one.branch]
+        return one.square - least if least - self.least <= REFUTED else math.inf
+
+    def allowed(self) -> list[Tried]:
+        return [one for one in self.tried if self.above(one) <= SQUARE]
+
+    def outermost(self, side: int) -> Floats:
+        """Return the allowed point of least (`side` −1) or largest (1) Üy."""
+        return max((one.point for one in self.allowed()), key=lambda point: side * point[0])
+
+    def refuted_narrowly(self) -> list[Floats]:
+        """Return the best points of readings that are refuted, but narrowly."""
+        return [
+            point
+            for point in self.leaders()
+            if self.square(point) < self.least + _NARROWLY
+            and not math.isfinite(self.above(self.at(point)))
+        ]
+
+    def least_tried(self) -> float:
+        """Return the least sum of squares of the points that were tried here."""
+        return min(one.square for one in self.tried)
+
+    def adopt(self, other: "Search") -> None:
+        """Compare with the least of each branch that another search has found, too."""
+        for branch, square in other._least.items():
+            self._least[branch] = min(square, self._least.get(branch, math.inf))
+
+    def leaders(self) -> list[Floats]:
+        """The best point of each reading, the best of all first."""
+        found: dict[Readings, Floats] = {}
+        for number in np.argsort([one.square for one in self.tried]):
+            found.setdefault(self.tried[number].readings, self.tried[number].point)
+        return list(found.values())
+
+    def polish(
+        self,
+        start: Floats,
+        free: Sequence[int] | None = None,
+        most: int = 12,
+        loss: str = "linear",
+    ) -> Floats:
+        """Return the point of least squares over some parameters, by default all, from a start."""
+        free = [*range(start.size)] if free is None else list(free)
+        low, high = (bound[free] for bound in self._bounds)
+        found = least_squares(
+            lambda part: self.residuals(with_values(start, free, part)),
+            np.clip(start[free], low + 1e-9, high - 1e-9),
+            bounds=(low, high),
+            diff_step=1e-6,
+            max_nfev=most,
+            loss=loss,
+            f_scale=3.0,
+            ftol=1e-6,
+            xtol=1e-7,
+        )
+        return with_values(start, free, found.x)
+
+    def follow(self, start: Floats) -> None:
+        """Find the minimum that a start leads to."""
+        first = len(self.tried)
+        self.polish(start)
+        self.minima.append(min(self.tried[first:], key=lambda one: one.square))
+
+    def candidates(self) -> list[Floats]:
+        """Return the best point of each reading, the best of all first, and other minima."""
+        points = self.leaders()[:_MINIMA]
+        for minimum in sorted(self.minima, key=lambda one: one.square):
+            near = min(abs(minimum.point[0] - point[0]) for point in points)
+            if near > _APART and minimum.square < self.least + _HOPELESS and len(points) < _MINIMA:
+                points.append(minimum.point)
+        return points
+
+    def apart(self) -> list[float]:
+        """Return Üy of minima that the data allow with values between that they do not.
+
+        It is in parts of the peak.
+        """
+        minima = sorted(self.candidates(), key=lambda point: point[0])
+        allowed = [point for point in minima if self.above(self.at(point)) <= SQUARE]
+        onsets: list[float] = []
+        for low, high in itertools.pairwise(allowed):
+            if high[0] - low[0] < _SEVERAL:
+                continue
+            between = [
+                with_values(low, [0], part * low[0] + (1.0 - part) * high[0])
+                for part in (0.3, 0.5, 0.7)
+            ]
+            others = [*range(1, low.size)]
+            tried = [self.at(self.polish(point, others, most=6)) for point in between]
+            if max(map(self.above, tried)) > SQUARE:
+                onsets += [low[0], high[0]]
+        return sorted(set(onsets))
+
+    def slopes(self, point: Floats) -> Floats:
+        """Derivatives of the residuals by the parameters, a column each."""
+        columns = []
+        for at, step in enumerate(1e-5 * np.eye(point.size)):
+            low = np.clip(point - step, *self._bounds)
+            high = np.clip(point + step, *self._bounds)
+            columns.append((self.residuals(high) - self.residuals(low)) / (high - low)[at])
+        return np.column_stack(columns)
+
+    def intervals(self, widths: Floats) -> Floats:
+        """95 % intervals, (parameters, 2), from first guesses of half their widths; a bound where the data set none."""
+        for _ in range(3):
+            least = self.least
+            found = np.array(
+                [[self.end(at, side, float(widths[at])) for side in (-1, 1)] for at in range(3)]
+            )
+            if self.least > least - 0.02:
+                break
+            self.polish(self.best)
+        # what the profile of one parameter passed through may lie beyond the end of another's
+        every = np.vstack([found.T, [one.point[:3] for one in self.allowed()]])
+        return np.column_stack([every.min(axis=0), every.max(axis=0)])
+
+    def end(self, at: int, side: int, width: float) -> float:
+        """The lower (`side` −1) or upper (1) end of the interval of one parameter; the bound where the data set none.
+
+        The profile of each reading is followed from the outermost point known, by `width` at first.
+        """
+        outermost: dict[Readings, Floats] = {}
+        for one in self.allowed():
+            if side * one.point[at] > side * outermost.setdefault(one.readings, one.point)[at]:
+                outermost[one.readings] = one.point
+        return max(
+            (self._followed(at, side, width, point) for point in outermost.values()),
+            key=lambda end: side * end,
+        )
+
+    def _followed(self, at: int, side: int, width: float, start: Floats) -> float:
+        """The end of a profile, from a point that the data allow."""
+        slopes = self.slopes(start)
+        others = [one for one in range(start.size) if one != at]
+        direction = np.eye(start.size)[at]
+        direction[others] = -np.linalg.lstsq(slopes[:, others], slopes[:, at], rcond=1e-8)[0]
+        path = {float(start[at]): start}
+
+        @functools.cache
+        def beyond(value: float) -> float:
+            """Root of the least rise of the sum of squares at this value, less that of the end."""
+            near, *further = sorted(path.values(), key=lambda point: abs(point[at] - value))[:2]
+            along = (near - further[0]) / (near - further[0])[at] if further else direction
+            point, above = self._profiled(at, value, near, along)
+            if above <= SQUARE:
+                path[value] = point
+            return math.sqrt(min(max(above, 0.0), 30.0)) - math.sqrt(SQUARE)
+
+        limit = float(self._bounds[side > 0][at])
+        inside = float(start[at])
+        step = width
+        if inside == limit:
+            return limit
+        while beyond(value := side * min(side * (inside + side * step), side * limit)) <= 0.0:
+            if value == limit:
+                return limit
+            inside = value
+            step = 2.0 * step
+        if inside == start[at] and beyond(inside) >= 0.0:
+            return inside
+        return float(
+            brentq(beyond, inside, value, xtol=max(0.01 * abs(value - start[at]), 1e-9), rtol=1e-6)
+        )
+
+    def _profiled(self, at: int, value: float, near: Floats, along: Floats) -> tuple[Floats, float]:
+        """The least rise of the sum of squares with one parameter held, and where: `along` leads from a point near."""
+        change = value - near[at]
+        # and with the same friction at three accelerations of the table, in parts of its peak
+        kept = [
+            [0.0, 1.0, table] if at == 1 else [0.0, 1.0 / table, 1.0]
+            for table in (0.3, 0.6, 1.0)
+            if at > 0
+        ]
+        starts = [
+            near,
+            near + change * along,
+            *(near + change * np.resize(one + [0.0] * (near.size - 3), near.size) for one in kept),
+        ]
+        first = len(self.tried)
+        for start in starts:
+            self.residuals(with_values(np.clip(start, *self._bounds), [at], value))
+        held = sorted(self.tried[first:], key=lambda one: one.square)
+        if min(map(self.above, held)) > SQUARE:
+            others = [one for one in range(near.size) if one != at]
+            for one in held[:2]:
+                self.residuals(self.polish(one.point, others, most=6))
+        best = min(self.tried[first:], key=self.above)
+        return best.point, self.above(best)
+
+
+def with_values(point: Floats, free: list[int], part: Floats | Sequence[float] | float) -> Floats:
+    """A point with other values of some parameters."""
+    point = point.copy()
+    point[free] = part
+    return point
+
+
+def covariance(slopes: Floats) -> Floats:
+    """Return the covariance of parameters from derivatives of independent residuals.
+
+    `slopes` has a column for each parameter.  Rows and columns of parameters that no residual
+    depends on are NaN.
+    """
+    sizes = np.sqrt(np.sum(slopes**2, axis=0))
+    determined = np.flatnonzero(sizes > 1e-3)
+    covariances = np.full((sizes.size, sizes.size), np.nan)
+    part = slopes[:, determined] / sizes[determined]
+    scales = np.outer(sizes[determined], sizes[determined])
+    covariances[np.ix_(determined, determined)] = (
+        np.linalg.pinv(part.T @ part, rcond=1e-12) / scales
+    )
+    return covariances
