@@ -24,8 +24,8 @@ from .studies.calibration.measured_friction import measured_friction as measured
 from .studies.datasets import friction_parameters as friction_parameters
 from .studies.datasets import sweep as sweep
 from .studies.flags import flags as flags
-from .studies.hazard import HazardCurve as HazardCurve
 from .studies.hazard import displacement_hazard as displacement_hazard
+from .studies.hazard_curve import HazardCurve as HazardCurve
 from .studies.history import simulate as simulate
 from .studies.limits import limit_amplitude as limit_amplitude
 from .studies.published_statistics import published_statistics as published_statistics

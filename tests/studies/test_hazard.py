@@ -26,8 +26,8 @@ from slipsweep.studies.hazard import (
     exceedance_rates,
     fragility,
     openquake_fragility,
-    read_hazard_curve,
 )
+from slipsweep.studies.hazard_curve import read_hazard_curve
 from tests.studies.test_suite_statistics import suite_result
 from tests.support.commands import command
 

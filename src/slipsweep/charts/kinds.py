@@ -1,4 +1,4 @@
-"""What is drawn of which result, by command and from Python: the kinds of charts, and all of them as one PDF."""
+"""The kinds of charts: which result has which, one of them drawn, all of them as one PDF."""
 
 import io
 import textwrap
@@ -33,8 +33,8 @@ from slipsweep.studies.solved_again import DISPLACEMENT, is_newmark, is_recorded
 
 Draw = Callable[[Result, Options], Figure]
 
-#: Of each sort of result: what it is called in messages, and its charts, of the kinds that their
-#: functions' names say.
+#: The name of each sort of result in messages, and its charts.  The name of a chart's function is
+#: its kind.
 SORTS: dict[str, tuple[str, tuple[Draw, ...]]] = {
     "sweep": (
         "a sweep under harmonic motion",
@@ -69,25 +69,25 @@ SORTS: dict[str, tuple[str, tuple[Draw, ...]]] = {
 #: Flags that charts hatch and Newmark's block can raise.
 _NEWMARK_FLAGS = (Validity.STATICALLY_UNSTABLE, Validity.FLEXIBLE_BLOCK)
 
-#: Those that it raises only where its strength changes while it slides.
+#: Flags that it raises only where its strength changes while it slides.
 _STRENGTH_FLAGS = (Validity.MAY_NOT_STOP, Validity.NOT_AT_REST)
 
 
 def kinds_of(sort: str) -> dict[str, Draw]:
-    """The kinds of charts of a sort of result, in order."""
+    """Return the kinds of charts of a sort of result, in order."""
     return {function.__name__: function for function in SORTS[sort][1]}
 
 
 def check_kind(kind: str) -> str:
-    """`kind` if there is such a chart (InputError otherwise)."""
-    known = [name for sort in SORTS for name in kinds_of(sort)]
-    if kind not in known:
-        raise InputError(f"--kind {kind}: no such chart; {did_you_mean(kind, known)}")
+    """Return `kind` if there is such a chart (InputError otherwise)."""
+    kinds = [name for sort in SORTS for name in kinds_of(sort)]
+    if kind not in kinds:
+        raise InputError(f"--kind {kind}: no such chart; {did_you_mean(kind, kinds)}")
     return kind
 
 
 def fitting(result: Result, options: Options) -> list[str]:
-    """The kinds that are drawn of a result if none is named; with one axis left, its curve."""
+    """Return the kinds to draw of a result if none is named; with one axis left, its curve."""
     result.check_axes()
     kinds = kinds_of(result.sort)
     if options.equations and (drawn := [kind for kind in kinds if kind in equations.KINDS]):
@@ -111,7 +111,10 @@ def fitting(result: Result, options: Options) -> list[str]:
 
 
 def draw(result: Result, kind: str | None, options: Options) -> Figure:
-    """Draw one chart of a result, the first of those that fit if none is named (InputError if it cannot be drawn)."""
+    """Draw one chart of a result, by default the first that fits.
+
+    InputError: the chart cannot be drawn of this result.
+    """
     kinds = kinds_of(result.sort)
     kind = fitting(result, options)[0] if kind is None else check_kind(kind)
     if kind not in kinds:
@@ -147,7 +150,10 @@ def figure_of(
 def draw_all(
     result: Result, kinds: Iterable[str], options: Options, *, strict: bool
 ) -> tuple[dict[str, Figure], dict[str, str]]:
-    """Several charts, and why others cannot be drawn; InputError as `draw` if `strict`, or if none can be drawn."""
+    """Draw several charts; return them, and the reasons why others cannot be drawn.
+
+    InputError: as `draw`, if `strict`; or none can be drawn.
+    """
     figures: dict[str, Figure] = {}
     left_out: dict[str, str] = {}
     for kind in kinds:
@@ -159,7 +165,8 @@ def draw_all(
             left_out[kind] = str(error).removeprefix(f"{result.name}: ")
     if not figures:
         raise InputError(
-            f"{result.name}: no chart can be drawn from it: {'; '.join(dict.fromkeys(left_out.values()))}"
+            f"{result.name}: no chart can be drawn from it: "
+            f"{'; '.join(dict.fromkeys(left_out.values()))}"
         )
     return figures, left_out
 
@@ -184,7 +191,7 @@ def write_book(path: Path, result: Result, figures: Iterable[Figure]) -> None:
 
 
 def title_page(result: Result) -> Figure:
-    """What was computed, of which inputs, by which model and estimates, and by which versions."""
+    """Draw a page with the results, the inputs, the model and its estimates, and the versions."""
     attributes = result.attrs
     coords = result.data.coords
     names = {
@@ -202,7 +209,8 @@ def title_page(result: Result) -> Figure:
         changes = changing_strength(MODELS.from_attributes(attributes)) is not None
         flags = [*_NEWMARK_FLAGS, *(_STRENGTH_FLAGS if changes else ())]
     compared = [
-        "one interface (μs 0.38), two shaking-table tests: θ 5 and 6°, 0.36 and 0.52 g, 1.8 and 3.5 Hz"
+        "one interface (μs 0.38), two shaking-table tests: θ 5 and 6°, 0.36 and 0.52 g, 1.8 and "
+        "3.5 Hz"
     ]
     if is_recorded(result.data):
         compared.append("none under recorded motions: the rules for them extend the paper")

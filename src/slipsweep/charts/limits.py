@@ -1,4 +1,4 @@
-"""Charts of what a displacement allows: limit amplitudes, required strengths, annual rates."""
+"""Charts of limit amplitudes, required strengths and annual rates of a displacement."""
 
 from dataclasses import replace
 
@@ -21,6 +21,7 @@ from slipsweep.charts.style import Floats, Look, Options
 from slipsweep.charts.suites import draw_suite, suite_text
 from slipsweep.errors import InputError
 from slipsweep.files.selection import axis_labels
+from slipsweep.model.units import in_mm
 from slipsweep.model.variables import STRENGTHS, LimitStatus, StrengthStatus
 from slipsweep.published import EQUATIONS
 from slipsweep.studies.suite_statistics import SUITE, limit_quantiles
@@ -31,7 +32,10 @@ _MOST_MARKS = 20
 
 
 def limit(result: Result, options: Options) -> Figure:
-    """Limit amplitudes, in g, over one axis: a curve for each value of another; of a suite as `draw_suite`."""
+    """Draw limit amplitudes, in g, over one axis.
+
+    There is a curve for each value of another axis, or the motions of a suite (`draw_suite`).
+    """
     suite = SUITE if "motion" in result.dims else ()
     single = suite and not {*result.wide} - {*SUITE, *options.at}  # nothing varies but the motion
     along = "motion" if single else ("frequency", "mu_s", "theta", "displacement")
@@ -57,7 +61,7 @@ def limit(result: Result, options: Options) -> Figure:
 
 
 def _draw_curves(sheet: Sheet, panel: Panel) -> None:
-    """The curves of a family, in circles where a discontinuity of the model sets the limit."""
+    """Draw a family of curves, with circles where a discontinuity of the model sets the limit."""
     xs = panel.xs
     limits = panel.grid("limit_amplitude") / panel.g
     states = panel.grid("limit_status")
@@ -87,7 +91,7 @@ def _draw_family(sheet: Sheet, panel: Panel, values: Floats) -> None:
 
 
 def _draw_motions(sheet: Sheet, panel: Panel) -> None:
-    """The limits of the motions of a suite, with their median and band."""
+    """Draw the limits of the motions of a suite, with their median and band."""
     xs = panel.xs
     limits = panel.data["limit_amplitude"]
     quantiles = (
@@ -112,14 +116,14 @@ def _draw_points(
     panel.axes.set_xlim(*ends)
     points = values.transpose("motion", ...).values.reshape(xs.size, -1)
     polarities = panel.data["polarity"].values if "polarity" in values.dims else ()
-    names = [f"polarity {one:g}" for one in polarities] or ["a motion"]
+    names = [f"polarity {polarity:g}" for polarity in polarities] or ["a motion"]
     look: Look = {"linestyle": "", "markerfacecolor": "white", "color": "0.2"}
     for name, row, marker in zip(names, points.T, "os", strict=False):
         (sheet.legend[name],) = panel.axes.plot(xs, row, marker=marker, **look)
 
 
 def strength(result: Result, options: Options) -> Figure:
-    """Required strengths over one axis: of a suite or of samples with median and band."""
+    """Draw required strengths over one axis, of a suite or of samples with median and band."""
     of = str(result.attrs["required"])
     name = f"required_{of}"
     has_band = f"{name}_quantile" in result.variables
@@ -173,7 +177,7 @@ def _draw_required(sheet: Sheet, panel: Panel, name: str) -> None:
 
 
 def _required_text(data: xr.Dataset, has_band: bool) -> str:
-    """Return what the band is of, and how many no strength holds, or every one."""
+    """Return the caption: runs of the band, and how many stay within at any or no strength."""
     texts = []
     if has_band:
         runs = str(data.attrs.get("pooled", ""))
@@ -196,17 +200,18 @@ def _required_text(data: xr.Dataset, has_band: bool) -> str:
 
 
 def _suite_text(data: xr.Dataset) -> str:
-    """What the median is of, and the motions that have no limit."""
+    """Return the caption: motions of the median, and those that have no limit."""
     status = data["limit_status"].values
     beyond, invalid = (
-        int(np.count_nonzero(status == one))
-        for one in (LimitStatus.NOT_REACHED, LimitStatus.INVALID)
+        int(np.count_nonzero(status == code))
+        for code in (LimitStatus.NOT_REACHED, LimitStatus.INVALID)
     )
     texts = [f"Median and band are of {suite_text(data['limit_amplitude'].sizes)}."]
     if beyond:
         highest = f"{float(data.attrs['maximum_amplitude']) / float(data.attrs['g']):.4g} g"
         texts.append(
-            f"{beyond} of {status.size} limits are above {highest}; they count as larger than all others."
+            f"{beyond} of {status.size} limits are above {highest}; they count as larger than all "
+            "others."
         )
     if invalid:
         texts.append(f"{invalid} of {status.size} have no value and are left out.")
@@ -214,16 +219,16 @@ def _suite_text(data: xr.Dataset) -> str:
 
 
 def drawn_thresholds(data: xr.Dataset, requested: Floats) -> Floats:
-    """Displacements, m, that a curve of rates is drawn through: those requested, and as many as a smooth one needs."""
+    """Return displacements, m, of a smooth curve of rates, among them those requested."""
     most = max(np.nanmax(data["permanent_displacement"].values), requested[-1])
-    least = min([one for one in requested if one > 0.0] + [most]) / 10.0
+    least = min([displacement for displacement in requested if displacement > 0.0] + [most]) / 10.0
     return np.union1d(np.geomspace(least, most, 121) if most > 0.0 else [], requested)
 
 
 def hazard(result: Result, options: Options) -> Figure:
-    """The mean annual rate of exceedance over the displacement, a curve for each grid point.
+    """Draw the mean annual rate of exceedance over the displacement, a curve for each grid point.
 
-    The displacements that the attribute ``marked`` has, or all if they are few, have a marker.
+    The displacements of the attribute ``marked``, or all if they are few, have a marker.
     Curves are dotted where more than half of the rate is held above the largest amplitude.
     """
     rates = result.data
@@ -240,11 +245,11 @@ def hazard(result: Result, options: Options) -> Figure:
     if len(names) > _MOST_CURVES:
         most = f"a chart shows {_MOST_CURVES} at most; cut axes with --at NAME=VALUE"
         raise InputError(f"{len(names)} grid points: {most}")
-    wanted = rates["threshold"].values
-    few = wanted.size <= _MOST_MARKS
-    marks = np.isin(wanted, wanted if few else rates.attrs.get("marked", []))
+    thresholds = rates["threshold"].values
+    few = thresholds.size <= _MOST_MARKS
+    marks = np.isin(thresholds, thresholds if few else rates.attrs.get("marked", []))
     lines, held = (
-        rates[name].values.reshape(-1, wanted.size) for name in ("annual_rate", "held_rate")
+        rates[name].values.reshape(-1, thresholds.size) for name in ("annual_rate", "held_rate")
     )
     if not (lines[:, marks if marks.any() else slice(None)] > 0.0).any():
         raise InputError(
@@ -259,19 +264,20 @@ def hazard(result: Result, options: Options) -> Figure:
         ylabel=f"mean annual rate of {style.displacement_symbol(rates.attrs)} > d (1/year)",
     )
     panel.grid(color="0.9", which="both")
+    displacements = in_mm(thresholds)
     for look, name, line, part in zip(curve_looks(len(names)), names, lines, held, strict=True):
-        shown = np.where((line > 0.0) & (wanted > 0.0), line, np.nan)
+        shown = np.where((line > 0.0) & (thresholds > 0.0), line, np.nan)
         above = part > 0.5 * line
         joined = (
             above | np.append(False, above[:-1]) | np.append(above[1:], False)
         )  # no gaps between the two
         dashed = {"color": look["color"], "linestyle": look["linestyle"]}
-        panel.plot(wanted * 1000.0, np.where(above, np.nan, shown), **dashed)
+        panel.plot(displacements, np.where(above, np.nan, shown), **dashed)
         panel.plot(
-            wanted * 1000.0, np.where(joined, shown, np.nan), color=look["color"], linestyle=":"
+            displacements, np.where(joined, shown, np.nan), color=look["color"], linestyle=":"
         )
         handle = {**look, "linestyle": "none"} if marks.any() else dashed
-        (drawing.legend[name],) = panel.plot(wanted[marks] * 1000.0, shown[marks], **handle)
+        (drawing.legend[name],) = panel.plot(displacements[marks], shown[marks], **handle)
     for axis, (low, high) in ((panel.xaxis, panel.get_xlim()), (panel.yaxis, panel.get_ylim())):
         log_ticks(axis, high / low)
     if len(names) == 1:  # the caption has what the curve is of

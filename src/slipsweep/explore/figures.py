@@ -15,6 +15,7 @@ from slipsweep.charts.style import (
     length_text,
 )
 from slipsweep.explore.excerpt import Excerpt
+from slipsweep.model.units import in_mm
 from slipsweep.model.variables import PARAMETERS, RESULTS, STATISTIC_COORDINATES, STATISTICS
 
 
@@ -47,7 +48,7 @@ def decades(excerpt: Excerpt) -> tuple[int, int]:
     positive = values[np.isfinite(values) & (values > 0.0)]
     if positive.size == 0:
         return 0, 1
-    fifth, ninety_fifth = np.log10(np.percentile(positive, (5.0, 95.0)) * 1000.0)
+    fifth, ninety_fifth = np.log10(in_mm(np.percentile(positive, (5.0, 95.0))))
     low = math.floor(fifth)
     high = max(math.ceil(ninety_fifth), math.floor(fifth) + 1)
     if high - low > 5:

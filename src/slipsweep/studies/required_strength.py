@@ -27,7 +27,7 @@ TITLE = "Strength that is required for a tolerable displacement"
 #: Inputs that are the strength of the interface, of which one is solved for.
 _STRENGTHS = (*variables.REQUIRED_STRENGTHS, "yield_acceleration")
 
-#: A strength that every model takes, where the required one will stand.
+#: A strength that every model allows, in place of the required one.
 _ANY = 0.5
 
 #: Evaluations of the kernel for each required strength, about.
@@ -209,16 +209,16 @@ def plan_strength(
                     'be drawn, with kind = "factor" or "offset"'
                 )
         check_drawn(sampling, (*inputs.given, of), problem)
-        absolute = [name for name, one in drawn.items() if one.kind == "absolute"]
+        absolute = [name for name, entry in drawn.items() if entry.kind == "absolute"]
     planned = replace(inputs, **{of: _ANY}, **dict.fromkeys(absolute, _ANY))
-    wanted = ["permanent_displacement"]
-    plan = plans.plan_sweep(planned, excitation=excitation, model=model, variables=wanted)
+    names = ["permanent_displacement"]
+    plan = plans.plan_sweep(planned, excitation=excitation, model=model, variables=names)
     dropped = {of, "mu_s", *absolute}
     if "displacement_amplitude" in plan.coords and (
         {"displacement_amplitude", "frequency"} & {*absolute}
     ):
-        dropped.add("amplitude")  # A = ω²d of no value is nobody's amplitude
-    coords = {name: one for name, one in plan.coords.items() if name not in dropped}
+        dropped.add("amplitude")  # without values of d and f there is no A = ω²d
+    coords = {name: value for name, value in plan.coords.items() if name not in dropped}
     source = plan.attrs["friction_inputs"].partition(";")[2]
     attrs = {
         **plan.attrs,
@@ -236,7 +236,7 @@ def plan_strength(
 
 
 class StrengthPlan(plans.Plan):
-    """Required strengths of a grid, each motion's along `pooled` dimensions, and quantiles."""
+    """Required strengths of a grid, with those of each motion along `pooled` dimensions."""
 
     def __init__(
         self,
@@ -313,8 +313,8 @@ class StrengthPlan(plans.Plan):
             }
             coords["quantile"] = xr.Variable("quantile", self.quantiles, about)
         results = {}
-        for name, own in self.results.items():
-            dims = (*self.sizes, *own)
+        for name, more_dims in self.results.items():
+            dims = (*self.sizes, *more_dims)
             zero = np.zeros((), variables.RESULT_DTYPES.get(name, "float64"))
             shape = [lengths[dim] for dim in dims]
             results[name] = (
@@ -399,13 +399,13 @@ def friction_of(yield_coefficient: Floats, theta: Floats, of: str) -> Floats:
 
 
 def quantiles_of(strengths: Floats, never: np.ndarray, shares: Floats) -> Floats:
-    """Return quantiles along the last axis, in which those `never` within are above all others.
+    """Return quantiles along the last axis; strengths of cells `never` within are infinite.
 
     A quantile that lies among them, or between them and the largest of the others, is infinite.
     """
-    # so large that whatever is interpolated towards it is above all others
+    # so large that a value interpolated towards it is above all others
     beyond = np.finfo(np.float64).max / 4.0
     filled = np.where(never, beyond, strengths)
-    found = np.moveaxis(np.quantile(filled, shares, axis=-1), 0, -1)
+    interpolated = np.moveaxis(np.quantile(filled, shares, axis=-1), 0, -1)
     largest = np.where(never, -np.inf, strengths).max(axis=-1)
-    return np.where(found > largest[..., np.newaxis], np.inf, found)
+    return np.where(interpolated > largest[..., np.newaxis], np.inf, interpolated)

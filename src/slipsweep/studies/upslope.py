@@ -1,4 +1,4 @@
-"""Where a block that slides both ways would also slide upslope, which neither model lets it do.
+"""Sliding upslope, which a block under both models leaves out.
 
 Both models let a block slide downslope only, but for continuous sliding by the paper's law.  On a
 level or gentle base a block also slides back, and ends near where it began.
@@ -22,16 +22,16 @@ from slipsweep.motion.waveforms import WAVEFORMS, peak_acceleration
 def upslope_yield_acceleration(
     yield_acceleration: xr.DataArray, theta: xr.DataArray, g: float
 ) -> xr.DataArray:
-    """Acceleration of the base beyond which a block slides upslope, m/s², from that for downslope.
+    """Return the acceleration of the base beyond which a block slides upslope, m/s².
 
-    By statics g tan(arctan(Üy/g) + 2θ), which is g tan(φs + θ) with Coulomb's Üy; `theta` is in
-    degrees.  Infinite where the angle reaches 90°.
+    It follows from Üy by statics, g tan(arctan(Üy/g) + 2θ), which is g tan(φs + θ) with Coulomb's
+    Üy; `theta` is in degrees.  Infinite where the angle reaches 90°.
     """
     tan_theta = xr.apply_ufunc(np.tan, np.radians(1.0) * theta)
 
     def by_statics(onset: Any, tangent: Any) -> Any:
-        given = {"yield_acceleration": onset, "tan_theta": tangent}
-        return engine.upslope_yield_acceleration(given, g)
+        interface = {"yield_acceleration": onset, "tan_theta": tangent}
+        return engine.upslope_yield_acceleration(interface, g)
 
     onset: xr.DataArray = xr.apply_ufunc(by_statics, yield_acceleration, tan_theta)
     return onset
@@ -84,19 +84,22 @@ def sliding_ways(
 
 
 def _values(data: xr.Dataset, name: str) -> xr.DataArray:
-    """A parameter without its coordinates, which would have to agree with those of others."""
+    """Return a parameter without its coordinates, which would have to agree with others."""
     return data[name].astype(np.float64).reset_coords(drop=True)
 
 
 def _amplitude(data: xr.Dataset) -> Any:
-    """Peak ground acceleration under a waveform, m/s²."""
+    """Return the peak ground acceleration under a waveform, m/s²."""
     if "amplitude" in data.variables:
         return _values(data, "amplitude")
     return peak_acceleration(_values(data, "displacement_amplitude"), _values(data, "frequency"))
 
 
 def _peaks(data: xr.Dataset, motion: Record | Suite | None) -> tuple[Any, Any] | None:
-    """Largest accelerations of the base that drive the block downslope and upslope, m/s²; None: not known."""
+    """Return the largest accelerations of the base downslope and upslope, m/s².
+
+    None: they are not known.
+    """
     if WAVEFORMS.attribute in data.attrs:
         wave = wave_of(WAVEFORMS.from_attributes(data.attrs))
         amplitude = _amplitude(data)
@@ -107,7 +110,7 @@ def _peaks(data: xr.Dataset, motion: Record | Suite | None) -> tuple[Any, Any] |
 
 
 def _recorded_peaks(data: xr.Dataset, motion: Record | Suite) -> tuple[Any, Any]:
-    """Those of a record, or of the motions of a suite one by one."""
+    """Return `_peaks` of a record, or of each motion of a suite."""
     for name in ("motion", "azimuth"):
         if name in data.coords and data[name].ndim:
             (dim,) = data[name].dims
@@ -117,7 +120,9 @@ def _recorded_peaks(data: xr.Dataset, motion: Record | Suite) -> tuple[Any, Any]
     if isinstance(motion, Suite):
         record = motion[str(data["motion"].item())]
         motion = record.rotated(data["azimuth"].item()) if isinstance(record, Pair) else record
-    coords = {str(name): one.reset_coords(drop=True) for name, one in data.coords.items()}
+    coords = {
+        str(name): coordinate.reset_coords(drop=True) for name, coordinate in data.coords.items()
+    }
     factor = strength_factor(motion.times, motion.acceleration, coords) * coords["polarity"]
     ends = [factor * end for end in (motion.acceleration.min(), motion.acceleration.max())]
     return np.maximum(*ends), -np.minimum(*ends)

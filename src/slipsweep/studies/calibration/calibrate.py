@@ -19,6 +19,7 @@ from slipsweep.studies.calibration.corrected import (
 )
 from slipsweep.studies.calibration.estimate import (
     Estimate,
+    Fit,
     Solution,
     best_fit,
     cycle_estimate,
@@ -145,15 +146,13 @@ def calibrate(
 
     # threads of BLAS wait for each other: ten times as long on a busy machine
     with threadpool_limits(1, "blas"):
-        estimated = _estimate(observed())
+        estimated = estimate(_fit(observed()))
         statics = [friction_by_statics(solution) for solution in estimated.solutions]
         constant = next((each for each in statics if each.attrs["constant_friction"]), None)
         clipped = findings.clipped_channels(estimated)
         misfit: list[str] = []
         if constant is None and not clipped:
-            misfit = findings.unexplained_channels(
-                estimated, lambda name: best_fit(observed(name)).solutions()
-            )
+            misfit = findings.unexplained_channels(estimated, lambda name: best_fit(observed(name)))
         parts = [_of_test(solution, estimated, cycles) for solution in estimated.solutions]
         results = parts[0]
         if len(parts) > 1:
@@ -172,15 +171,16 @@ def calibrate(
     return results
 
 
-def _estimate(observations: Sequence[Observation]) -> Estimate:
-    """Return the estimate, without samples of slips upslope, which stick-slip does not have."""
+def _fit(observations: Sequence[Observation]) -> Fit:
+    """Return the best fit, without samples of slips upslope, which stick-slip does not have."""
     fit = best_fit(observations)
-    if "continuous" not in fit.readings:
-        for number, observation in enumerate(observations):
-            observation.leave_out_upslope_slips(fit.parameters(number))
-        if any(observation.upslope for observation in observations):
-            fit = best_fit(observations)
-    return estimate(fit)
+    if "continuous" in fit.readings:
+        return fit
+    for solution in fit.solutions:
+        solution.observation.leave_out_upslope_slips(solution.parameters)
+    if any(observation.upslope for observation in observations):
+        return best_fit(observations)
+    return fit
 
 
 def _of_test(solution: Solution, estimated: Estimate, cycles: bool) -> xr.Dataset:

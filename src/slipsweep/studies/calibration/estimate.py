@@ -6,6 +6,7 @@ beside jumps are estimated, and the search is repeated until they no longer chan
 those of `search.Search`, widened where the residuals are not linear (docs/calibration.md).
 """
 
+import copy
 import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -114,7 +115,11 @@ class JointLikelihood:
     """Likelihoods of all tests, each linearised near a point of the search."""
 
     def __init__(
-        self, scale: Scale, observations: Sequence[Observation], point: Floats, rough: float
+        self,
+        scale: Scale,
+        observations: Sequence[Observation],
+        point: Floats,
+        rough: float = 0.0,
     ) -> None:
         self.scale = scale
         self.observations = observations
@@ -130,19 +135,17 @@ class JointLikelihood:
         """Linearise anew, near another point (`rough` as of `Likelihood`)."""
         self.likelihoods = self._near(point, rough)
 
-    def linearize_with(self, point: Floats, table_errors: Sequence[Floats]) -> None:
-        """Linearise near a point, with these errors of the table's motion of each test."""
-        self._set_table_errors(table_errors)
-        self.linearize(point)
+    def moved_to(self, point: Floats) -> "JointLikelihood":
+        """Return the likelihoods near another point, with the motion of the table likely there.
 
-    def set_back(self, likelihoods: list[Likelihood], table_errors: Sequence[Floats]) -> None:
-        """Take likelihoods that were linearised before, with these errors of the table's motion."""
-        self._set_table_errors(table_errors)
-        self.likelihoods = likelihoods
-
-    def _set_table_errors(self, table_errors: Sequence[Floats]) -> None:
-        for observation, errors in zip(self.observations, table_errors, strict=True):
-            observation.table_errors = errors
+        They have copies of the observations: these here do not change.
+        """
+        observations = []
+        for number, likelihood in enumerate(self.likelihoods):
+            observation = copy.copy(likelihood.observation)
+            observation.table_errors = likelihood.likely_motion(self.scale.of_test(point, number))
+            observations.append(observation)
+        return JointLikelihood(self.scale, observations, point)
 
     def residuals(self, point: Floats) -> Floats:
         """Return independent residuals of all tests."""
@@ -159,13 +162,6 @@ class JointLikelihood:
             self.scale.reading(point, observation.peak_of(self.scale.of_test(point, number)[3:]))
             for number, observation in enumerate(self.observations)
         )
-
-    def likely_motions(self, point: Floats) -> list[Floats]:
-        """Return the most likely errors of the table's motion of each test at a point."""
-        return [
-            likelihood.likely_motion(self.scale.of_test(point, number))
-            for number, likelihood in enumerate(self.likelihoods)
-        ]
 
     def settle(self, points: Sequence[Floats]) -> float:
         """Estimate noise and the table's motion by the first of some points that may be right.
@@ -189,31 +185,29 @@ class JointLikelihood:
 
 
 class Fit(NamedTuple):
-    """The search that has found the best values for all tests, and their likelihoods near it."""
+    """The best fit of one or several tests: their likelihoods, and the search that found it."""
 
     joint: JointLikelihood
     search: Search
 
     @property
     def readings(self) -> set[str]:
-        """Return what decides the block's acceleration at the points that the data allow."""
+        """What decides the acceleration of the block at the points that the data allow."""
         return {reading for tried in self.search.allowed() for reading in tried.readings}
 
-    def parameters(self, number: int) -> Floats:
-        """Return the best Üy, λ and Δμ, and offset and drift of the table in a test."""
-        return self.joint.scale.of_test(self.search.best, number)
-
+    @property
     def solutions(self) -> list[Solution]:
-        """Return the solution for each test, by the slopes of the residuals at the best values."""
-        scale = self.joint.scale
-        best = self.search.best
-        slopes = scale.slopes(best)
-        covariances = covariance(self.search.slopes(best)) * np.outer(slopes, slopes)
-        return _solutions(self.joint, best, np.sqrt(np.diag(covariances)))
+        """The solution for each test, without standard errors."""
+        none = np.full(2, np.nan)
+        solutions = []
+        for number, likelihood in enumerate(self.joint.likelihoods):
+            parameters = self.joint.scale.of_test(self.search.best, number)
+            solutions.append(Solution(likelihood, parameters, none[: parameters.size - 3]))
+        return solutions
 
 
 def estimate(fit: Fit) -> Estimate:
-    """Return what the tests of a fit say: errors and intervals beside the best values."""
+    """Return errors and intervals of the parameters beside their best values."""
     joint, search = fit
     scale = joint.scale
     width = QUANTILE * np.sqrt(np.diag(covariance(search.slopes(search.best))))
@@ -236,6 +230,14 @@ def estimate(fit: Fit) -> Estimate:
     correlation = np.nan_to_num(covariances / np.outer(deviations, deviations))
     np.fill_diagonal(correlation, 1.0)
     errors = _errors(deviations[:3], best, low, high)
+    solutions = [
+        Solution(
+            likelihood,
+            np.append(best, scale.of_test(search.best, number)[3:]),
+            deviations[scale.lines(number)],
+        )
+        for number, likelihood in enumerate(joint.likelihoods)
+    ]
     return Estimate(
         parameters=best,
         errors=np.where(determined, errors, np.nan),
@@ -245,21 +247,15 @@ def estimate(fit: Fit) -> Estimate:
         allowed=np.array([scale.parameters(tried.point) for tried in allowed]),
         readings={reading for tried in allowed for reading in tried.readings},
         apart=[onset * scale.peak for onset in apart],
-        solutions=_solutions(joint, search.best, deviations),
+        solutions=solutions,
     )
 
 
-def _solutions(joint: JointLikelihood, best: Floats, deviations: Floats) -> list[Solution]:
-    """Return the solution for each test at the best point, of these standard deviations."""
-    scale = joint.scale
-    return [
-        Solution(likelihood, scale.of_test(best, number), deviations[scale.lines(number)])
-        for number, likelihood in enumerate(joint.likelihoods)
-    ]
-
-
 def best_fit(observations: Sequence[Observation]) -> Fit:
-    """Fit all tests until noise, table motions and samples at jumps have settled."""
+    """Fit one or several tests of one interface.
+
+    Noise, the motion of the tables and the samples at jumps settle with the fit.
+    """
     scale = Scale(observations)
     joint, points = _first_minima(scale, observations)
     change = math.inf
@@ -285,48 +281,40 @@ def _linearised_anew(
     were linearised.  Far from it, at the ends of the interval of Üy and at the best of other
     branches, they are linearised once more, with the motion of the table that is likely there.
     """
-    table_errors = [observation.table_errors for observation in joint.observations]
+    joint.linearize(search.best)
     ends = [np.transpose(intervals)]
     allowed = search.allowed()
     width = float(np.clip(0.1 * np.ptp(intervals[0]), 1e-5, 0.3))
-    joint.linearize_with(search.best, table_errors)
-    at_best = joint.likelihoods
     for side in (-1, 1):
-        joint.set_back(at_best, table_errors)
-        before = search
+        before = Fit(joint, search)
         for _ in range(_TURNS):
-            after = _search_linearised_at(before.outermost(side), before, search, joint)
+            after = _linearised_at(before.search.outermost(side), before, search)
             if after is None:
                 break
-            after.end(0, side, width)
-            allowed += after.allowed()
+            after.search.end(0, side, width)
+            allowed += after.search.allowed()
             before = after
-    joint.set_back(at_best, table_errors)
     for point in search.refuted_narrowly():
-        joint.set_back(at_best, table_errors)
-        after = _search_linearised_at(point, search, search, joint)
+        after = _linearised_at(point, Fit(joint, search), search)
         if after is not None:
-            ends.append(np.transpose(after.intervals(np.full(3, 0.05))))
-            allowed += after.allowed()
-    joint.set_back(at_best, table_errors)
+            ends.append(np.transpose(after.search.intervals(np.full(3, 0.05))))
+            allowed += after.search.allowed()
     points = np.vstack([*ends, [tried.point[:3] for tried in allowed]])
     return np.column_stack([points.min(axis=0), points.max(axis=0)]), allowed
 
 
-def _search_linearised_at(
-    point: Floats, before: Search, first: Search, joint: JointLikelihood
-) -> Search | None:
+def _linearised_at(point: Floats, before: Fit, first: Search) -> Fit | None:
     """Return a search linearised at a point; None if that changes little or allows nothing.
 
-    `before` is the search that led to the point, and `first` the one whose least counts, too.
+    `before` led to the point, and the least of the search `first` counts, too.
     """
-    square = before.square(point)
-    joint.linearize_with(point, joint.likely_motions(point))
-    after = joint.search()
-    after.adopt(first)
-    after.polish(point, free=range(1, point.size), most=6)
-    changes = after.least_tried() < square - _NOT_LINEAR
-    return after if changes and after.allowed() else None
+    square = before.search.square(point)
+    joint = before.joint.moved_to(point)
+    search = joint.search()
+    search.adopt(first)
+    search.polish(point, free=range(1, point.size), most=6)
+    changes = search.least_tried() < square - _NOT_LINEAR
+    return Fit(joint, search) if changes and search.allowed() else None
 
 
 def _errors(deviations: Floats, best: Floats, low: Floats, high: Floats) -> Floats:

@@ -19,7 +19,7 @@ from slipsweep.studies.calibration.corrected import (
     slides_in,
     table_at_samples,
 )
-from slipsweep.studies.calibration.estimate import Estimate, Solution
+from slipsweep.studies.calibration.estimate import Estimate, Fit, Solution
 from slipsweep.studies.calibration.measured_friction import onset_acceleration
 from slipsweep.studies.calibration.noise import flat_top, noisy_flat_top
 from slipsweep.studies.calibration.observation import SOUGHT, Observation
@@ -44,7 +44,7 @@ _ANOTHER = "Test at another amplitude and give calibrate all tests together"
 
 
 def sweep_of(solution: Solution, estimated: Estimate, **changed: Any) -> xr.Dataset:
-    """Return the sweep of the estimated parameters under a test's motion; `changed` replaces some."""
+    """Return the sweep of the estimated parameters, or `changed` ones, under a test's motion."""
     observation = solution.observation
     best = dict(zip(SOUGHT, map(float, estimated.parameters), strict=True))
     return sweep(
@@ -94,8 +94,8 @@ def report(
     if (results["validity"] & variables.Validity.NOT_RECOUPLED).any():
         sentences.append(
             "The computed block does not come to rest before the next slide begins (flag "
-            "not_recoupled). Small errors of the table's motion may then change the motion much: the "
-            "intervals may be too narrow."
+            "not_recoupled). Small errors of the table's motion may then change the motion much: "
+            "the intervals may be too narrow."
         )
     if constant is not None and not clipped:
         tables = sweep_tables.newmark_tables(observations[0], constant)
@@ -142,8 +142,8 @@ def _upslope_slips(observation: Observation) -> list[str]:
         return []
     many = f"{len(times)} time{'s' if len(times) > 1 else ''}"
     return [
-        f"The block slipped upslope {many} (first at {times[0]:.3g} s). In stick-slip the model has "
-        "no upslope slip: these samples are left out, and the displacement may step there."
+        f"The block slipped upslope {many} (first at {times[0]:.3g} s). In stick-slip the model "
+        "has no upslope slip: these samples are left out, and the displacement may step there."
     ]
 
 
@@ -206,10 +206,10 @@ def _coloured_noise(observation: Observation, name: str) -> list[str]:
     return texts
 
 
-def _misfits_in_noise(solutions: Sequence[Solution]) -> dict[str, float]:
+def _misfits_in_noise(estimated: Estimate | Fit) -> dict[str, float]:
     """Return the channels whose misfit is larger than their noise, and how many times."""
     larger: dict[str, float] = {}
-    for solution in solutions:
+    for solution in estimated.solutions:
         observation = solution.observation
         of_channels = zip(
             observation.channels,
@@ -224,15 +224,13 @@ def _misfits_in_noise(solutions: Sequence[Solution]) -> dict[str, float]:
     return larger
 
 
-def unexplained_channels(
-    estimated: Estimate, with_drift: Callable[[str], Sequence[Solution]]
-) -> list[str]:
+def unexplained_channels(estimated: Estimate, with_drift: Callable[[str], Fit]) -> list[str]:
     """Return which channels the fit does not explain, in words.
 
-    For each that may drift, `with_drift` gives the solutions with an offset and a drift of it; a
-    sentence says if these explain it.
+    For each that may drift, `with_drift` fits with an offset and a drift of it; a sentence says if
+    these explain it.
     """
-    misfits = _misfits_in_noise(estimated.solutions)
+    misfits = _misfits_in_noise(estimated)
     if not misfits:
         return []
     listed = ", ".join(f"{name} {times:.2g} times" for name, times in misfits.items())

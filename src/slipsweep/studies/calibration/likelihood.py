@@ -125,7 +125,7 @@ class Likelihood:
         return weighted
 
     def by_channel(self, values: Floats) -> list[Floats]:
-        """Return the values of samples that count (the first axis) as one array for each channel."""
+        """Return values of samples that count (the first axis), an array for each channel."""
         return np.split(values, np.cumsum(self.counted.sum(axis=1))[:-1])
 
     def rest(self, parameters: Floats) -> Floats:

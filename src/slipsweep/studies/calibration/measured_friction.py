@@ -1,4 +1,4 @@
-"""The friction that a test measured: Eq. 1 and statics on recorded accelerations, and the slides in them.
+"""`measured_friction`: Eq. 1 and statics on recorded accelerations, and the slides in them.
 
 The block slides where its acceleration is not the table's.  A slide is looked for in the relative
 acceleration r = Üg − Ü: it begins where |r| exceeds a threshold at two consecutive samples, and
@@ -35,7 +35,7 @@ Floats = NDArray[np.float64]
 #: Standard deviations of a normal distribution to either end of a 95 % interval.
 QUANTILE = 1.959964
 
-#: What a caller may give as a test.
+#: Types of a test.
 Test = str | Path | ShakingTest | xr.Dataset | Mapping[str, xr.DataArray]
 
 #: The threshold of a slide: standard deviations of the noise of r, of which one sample in 16 000
@@ -78,7 +78,10 @@ BOUND = xr.Variable(
 
 
 def noise_of(values: Floats) -> float:
-    """Standard deviation of the noise of evenly or nearly evenly sampled values: robust, from third differences."""
+    """Return the standard deviation of the noise of evenly, or nearly evenly, sampled values.
+
+    It is that of third differences by their median, which few large values do not change.
+    """
     # those of white noise have 20 times its variance; those of a motion that the sampling resolves
     # are small
     differences = np.diff(values[np.isfinite(values)], 3) / 20.0**0.5
@@ -86,20 +89,24 @@ def noise_of(values: Floats) -> float:
 
 
 def threshold_of(table: Floats, block: Floats) -> tuple[float, str]:
-    """The relative acceleration beyond which the block slides, m/s², and why that much."""
+    """Return the relative acceleration beyond which the block slides, m/s², and its reason."""
     noise = noise_of(table - block)
     least = LEAST_THRESHOLD * float(np.abs(table).max())
     if NOISE_IN_THRESHOLD * noise < least:
         return (
             least,
-            f"{LEAST_THRESHOLD:.1%} of the largest acceleration of the table (the noise is smaller)",
+            f"{LEAST_THRESHOLD:.1%} of the largest acceleration of the table (the noise is "
+            "smaller)",
         )
-    why = f"{NOISE_IN_THRESHOLD:g} standard deviations of the noise of the relative acceleration, {noise:.3g} m s-2"
-    return NOISE_IN_THRESHOLD * noise, why
+    reason = (
+        f"{NOISE_IN_THRESHOLD:g} standard deviations of the noise of the relative acceleration, "
+        f"{noise:.3g} m s-2"
+    )
+    return NOISE_IN_THRESHOLD * noise, reason
 
 
 def slides_of(times: Floats, table: Floats, block: Floats, threshold: float) -> list[slice]:
-    """The samples of each slide in recorded accelerations; without an end where the record ends first."""
+    """Return the samples of each slide; the last has no end if the record ends first."""
     relative = np.nan_to_num(table - block)
     beyond = np.abs(relative) > threshold
     begins = np.flatnonzero(_in_turn(beyond, _BEGINS))
@@ -136,7 +143,10 @@ def _in_turn(holds: NDArray[np.bool_], count: int) -> NDArray[np.bool_]:
 
 
 def onset_acceleration(table: Floats, block: Floats, slide: slice, threshold: float) -> float:
-    """The table's acceleration where r left zero: a straight line through the first samples of the slide, back to 0."""
+    """Return the table's acceleration at the onset of a slide, where r leaves zero.
+
+    A straight line through the first samples of the slide is continued back to r = 0.
+    """
     relative = table - block
     to_peak = slice(slide.start, slide.start + np.argmax(table[slide]) + 1)
     rising = slide.start + np.flatnonzero(np.abs(relative[to_peak]) > threshold)[:_FIRST]
@@ -148,7 +158,10 @@ def onset_acceleration(table: Floats, block: Floats, slide: slice, threshold: fl
 
 
 def free_body_friction(block: Floats, theta: float, g: float) -> Floats:
-    """The friction coefficient that acts on a block, at rest the mobilised one: tan(θ + arctan(Ü/g))."""
+    """Return the friction coefficient by statics, tan(θ + arctan(Ü/g)); `theta` in degrees.
+
+    At rest it is the mobilised friction.
+    """
     return np.asarray(np.tan(np.radians(theta) + np.arctan(block / g)))
 
 
@@ -161,7 +174,9 @@ def eq1_friction(table: Any, block: Any, theta: float, mu_s: float, g: float) ->
 def coefficients_of(
     table: Floats, block: Floats, slides: Sequence[slice], mu_s: float, theta: float, g: float
 ) -> xr.Dataset:
-    """Static and kinetic friction by statics, with 95 % intervals, from the slides that begin downslope.
+    """Return static and kinetic friction by statics, with 95 % intervals.
+
+    They are those of the slides that begin downslope.
 
     The attribute `constant_friction` is a sentence if friction is level while the block slides,
     where Eq. 1 falls.
@@ -194,35 +209,42 @@ def coefficients_of(
         )  # of friction by the block's acceleration, near enough
         noise = noise_of(block) * slope
         every = np.concatenate(inside)
-        levels = np.array([np.nanmean(one[:, 0]) for one in inside])
+        levels = np.array([np.nanmean(samples[:, 0]) for samples in inside])
         (starts, between) = np.array(begins).T
         kinetic = _mean(levels, noise / (every.shape[0] / len(levels)) ** 0.5, 0.0)
         static = _mean(free_body_friction(starts, theta, g), noise, float(np.mean(between)) * slope)
         scatter = float(np.nanmean((every[:, 0] - kinetic[1]) ** 2)) - noise**2
         level = kinetic[1] > 0.0 and max(scatter, 0.0) ** 0.5 < _LEVEL * kinetic[1]
         constant = level and float(np.nanquantile(every[:, 1], _LOW_SHARE)) < _LOW * mu_s
-    found = {}
+    coefficients = {}
     for kind, (low, value, high) in (("static", static), ("kinetic", kinetic)):
         name = f"{kind} friction coefficient by statics"
         about, of_interval = (
             {"units": "1", "long_name": text} for text in (name, f"95 % interval of the {name}")
         )
-        found[f"{kind}_friction"] = xr.Variable((), value, about)
-        found[f"{kind}_friction_interval"] = xr.Variable(("bound",), [low, high], of_interval)
+        coefficients[f"{kind}_friction"] = xr.Variable((), value, about)
+        coefficients[f"{kind}_friction_interval"] = xr.Variable(
+            ("bound",), [low, high], of_interval
+        )
     sentence = (
-        f"This is a block of constant friction: by statics {kinetic[1]:.3g} while it slides, though Eq. 1 falls. "
-        "Newmark's model is the right one for it."
+        f"This is a block of constant friction: by statics {kinetic[1]:.3g} while it slides, "
+        "though Eq. 1 falls. Newmark's model is the right one for it."
     )
     if max(static[1], kinetic[1]) > _TOO_MUCH * mu_s:
         sentence = (
-            f"By statics friction is {static[1]:.3g} where a slide begins and {kinetic[1]:.3g} in it, more than "
-            f"mu_s = {mu_s:.3g}: are signs and units of all channels, theta and mu_s right?"
+            f"By statics friction is {static[1]:.3g} where a slide begins and {kinetic[1]:.3g} in "
+            f"it, more than mu_s = {mu_s:.3g}: are signs and units of all channels, theta and mu_s "
+            "right?"
         )
-    return xr.Dataset(found, attrs={"constant_friction": sentence if constant else ""})
+    return xr.Dataset(coefficients, attrs={"constant_friction": sentence if constant else ""})
 
 
 def _mean(values: Floats, noise: float, systematic: float) -> Floats:
-    """Mean of a value a slide within its 95 % interval: their scatter, or the noise, and what does not average out."""
+    """Return the mean of a value for each slide, between the ends of its 95 % interval.
+
+    The interval has the scatter of the values or their noise, whichever is larger, and a systematic
+    error, which does not become smaller with the number of slides.
+    """
     number = values.size
     scatter = (
         float(np.std(values, ddof=1)) * float(student.ppf(0.975, number - 1)) if number > 1 else 0.0
@@ -243,7 +265,7 @@ def measured_friction(
     rest: tuple[float, float] | None = None,
     threshold: float | None = None,
 ) -> xr.Dataset:
-    """Friction that a test on a shaking table measured, by Eq. 1 and by statics, and the slides in it.
+    """Friction in a test on a shaking table, by Eq. 1 and by statics, and the slides in it.
 
     Eq. 1 of the paper (reference [1] of `sweep`) gives μ(t) from the accelerations of table and
     block.  It falls also for a block of constant friction.  Statics gives the friction that acts on
@@ -262,14 +284,14 @@ def measured_friction(
     g : float
         Gravity, m/s².
     offset, drift : str or list of str
-        Channels to take a constant, or a straight line, off; "all" for all.  What was taken off,
-        and nothing else is, stands in the attribute `removed`.
+        Channels from which a constant, or a straight line, is subtracted; "all" for all.  The
+        attribute `removed` has what was subtracted; nothing else is.
     rest : (float, float), optional
-        From when to when table and block were at rest, s: what is taken off is fitted to these
-        samples, else to all.
+        Beginning and end of a time, s, in which table and block were at rest: what is subtracted is
+        fitted to these samples, else to all.
     threshold : float, optional
-        Relative acceleration beyond which the block slides, m/s²; by default 4 standard deviations of its noise, and
-        0.5 % of the table's largest acceleration at least.
+        Relative acceleration beyond which the block slides, m/s²; by default 4 standard deviations
+        of its noise, and 0.5 % of the table's largest acceleration at least.
 
     Returns
     -------
@@ -302,16 +324,16 @@ def measured_friction(
     >>> test.least_friction.round(2).values
     array([0.07, 0.07, 0.06, 0.08, 0.06, 0.04, 0.06, 0.05])
     """
-    given = test_of(test)
-    if "block_acceleration" not in given.channels:
+    recorded = test_of(test)
+    if "block_acceleration" not in recorded.channels:
         raise InputError(
-            f"{given.name}: block_acceleration: missing: Eq. 1 needs the accelerations of table and block; calibrate "
-            "takes a test without"
+            f"{recorded.name}: block_acceleration: missing: Eq. 1 needs the accelerations of table "
+            "and block; calibrate takes a test without"
         )
     theta = check_single("theta", theta)
     g = check_single("g", g)
     mu_s = single_friction_coefficient(mu_s, phi)
-    corrected, removed = given.corrected(offset, drift, rest)
+    corrected, removed = recorded.corrected(offset, drift, rest)
     check_contact(corrected, theta, g)
     times = corrected.times
     table = corrected.channels[TABLE]
@@ -326,15 +348,15 @@ def measured_friction(
             raise InputError(f"threshold = {shown(threshold)}: must be a finite number > 0, m/s²")
     slides = slides_of(times, table, block, limit)
     coefficients = coefficients_of(table, block, slides, mu_s, theta, g)
-    found = {
-        "slide_onset": [times[one.start] for one in slides],
-        "slide_peak": [times[one][np.argmax(table[one])] for one in slides],
-        "slide_stop": [times[one.stop - 1] if one.stop else np.nan for one in slides],
-        "onset_acceleration": [onset_acceleration(table, block, one, limit) for one in slides],
-        "peak_acceleration": [np.max(table[one]) for one in slides],
-        "peak_block_acceleration": [np.nanmax(block[one]) for one in slides],
-        "least_friction": [np.nanmin(eq1[one]) for one in slides],
-        "slide_free_body_friction": [np.nanmedian(free[one]) for one in slides],
+    of_slides = {
+        "slide_onset": [times[part.start] for part in slides],
+        "slide_peak": [times[part][np.argmax(table[part])] for part in slides],
+        "slide_stop": [times[part.stop - 1] if part.stop else np.nan for part in slides],
+        "onset_acceleration": [onset_acceleration(table, block, part, limit) for part in slides],
+        "peak_acceleration": [np.max(table[part]) for part in slides],
+        "peak_block_acceleration": [np.nanmax(block[part]) for part in slides],
+        "least_friction": [np.nanmin(eq1[part]) for part in slides],
+        "slide_free_body_friction": [np.nanmedian(free[part]) for part in slides],
     }
     series = {
         TABLE: table,
@@ -348,7 +370,7 @@ def measured_friction(
         {name: (("time",), values, about[name]) for name, values in series.items()}
         | {
             name: (("slide",), np.array(values, np.float64), SLIDES[name])
-            for name, values in found.items()
+            for name, values in of_slides.items()
         }
         | dict(coefficients.variables),
         {
@@ -370,20 +392,20 @@ def measured_friction(
     )
 
 
-def test_of(given: Any) -> ShakingTest:
-    """The test that a caller gives."""
-    if isinstance(given, ShakingTest):
-        return given
-    if not isinstance(given, (xr.Dataset, Mapping)):
-        return read_test(given)
-    known = {name: given[name] for name in ("time", *CHANNELS) if name in given}
-    for name, one in known.items():
-        if not isinstance(one, (xr.DataArray, xr.Variable)) or one.dims != ("time",):
-            raise InputError(f"test: {name} = {shown(one)}: must be a DataArray along time")
-    if "time" not in (data := xr.Dataset(known)):
+def test_of(test: Any) -> ShakingTest:
+    """Return a test from any of the types that a caller may give."""
+    if isinstance(test, ShakingTest):
+        return test
+    if not isinstance(test, (xr.Dataset, Mapping)):
+        return read_test(test)
+    arrays = {name: test[name] for name in ("time", *CHANNELS) if name in test}
+    for name, array in arrays.items():
+        if not isinstance(array, (xr.DataArray, xr.Variable)) or array.dims != ("time",):
+            raise InputError(f"test: {name} = {shown(array)}: must be a DataArray along time")
+    if "time" not in (data := xr.Dataset(arrays)):
         raise InputError("test: time: missing: must be a coordinate, s")
     channels = {}
-    for name in ("time", *known):
+    for name in ("time", *arrays):
         units = data[name].attrs.get("units")
         factor = 1.0 if units is None else unit_factor(f"test: {name}: units", name, str(units))
         channels[name] = factor * check_numbers(f"test: {name}", data[name])

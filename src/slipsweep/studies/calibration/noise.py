@@ -2,7 +2,7 @@
 
 Coloured noise is taken as noise of first order (an autoregressive process): errors of samples at
 the distance Δt have the correlation ρ^(Δt/h), with ρ of neighbours and h the interval of sampling.
-Such errors are made independent by subtracting from each what its neighbour says of it.
+Such errors are made independent by subtracting from each the part that follows from the one before.
 """
 
 from collections.abc import Sequence
@@ -124,10 +124,11 @@ def _unlikeliness(rest: Floats, effects: Floats, colour: float, apart: Floats) -
 
 
 def is_first_order(innovations: Floats) -> bool:
-    """Return whether residuals less what their neighbours say of them are independent and normal.
+    """Return True if innovations are independent and normal.
 
-    Those of a motion that a model misses are not: they are smooth, or few of them are large; and
-    where white noise is added to that, they alternate.
+    Innovations are residuals less the part that follows from the residual before (`whitened`).
+    Those of a motion that the model does not have are smooth, or few of them are large; with white
+    noise in addition they alternate.
     """
     centred = innovations - innovations.mean()
     square = float(np.sum(centred**2))
@@ -140,7 +141,7 @@ def is_first_order(innovations: Floats) -> bool:
 
 
 def flat_top(values: Floats) -> int:
-    """Return how many samples of a clipped channel lie at its largest value; else 0.
+    """Return the number of samples at the largest value of a clipped channel; else 0.
 
     The crest of a motion is a parabola, which has five times as many samples within 25 steps of a
     converter as within one.  A clipped crest has few beside its flat top.
@@ -159,13 +160,13 @@ def flat_top(values: Floats) -> int:
 
 
 def _in_runs(holds: NDArray[np.bool_]) -> int:
-    """Return how many samples at which something holds do not stand alone or in pairs."""
+    """Return the number of samples in runs of three or more at which `holds` is True."""
     lengths = np.bincount(ndimage.label(holds)[0])[1:]
     return int(np.sum(lengths[lengths >= _IN_TURN]))
 
 
 def noisy_flat_top(values: Floats) -> int:
-    """Return how many samples of a motion lie in a flat top under noise; else 0.
+    """Return the number of samples in a flat top under noise; else 0.
 
     A parabola has about as many samples within 5 standard deviations of the noise of the largest
     value as within the next 8; a top that was cut off before the noise was added has many more.

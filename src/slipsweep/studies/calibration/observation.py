@@ -28,10 +28,10 @@ from slipsweep.studies.calibration.measured_friction import Floats, check_contac
 from slipsweep.studies.calibration.noise import LEAST_NOISE, OF_MEDIAN, converter_noise
 from slipsweep.studies.calibration.table_motion import table_motion
 
-#: The series of `HISTORY` at some times, for Üy, λ and Δμ.
+#: Function of Üy, λ, Δμ and times that returns the series of `HISTORY`.
 Forward = Callable[[Floats, Floats], Mapping[str, Floats]]
 
-#: What is sought, in the order of all vectors.
+#: Parameters that are estimated, in the order of all vectors.
 SOUGHT = ("yield_acceleration", "decay_rate", "delta_mu")
 
 #: Standard deviation of an offset, drift or step, in parts of a channel's largest value: no bound,
@@ -49,7 +49,10 @@ _UPSLOPE_NOISE = 5.0
 
 
 class Line(NamedTuple):
-    """An offset, a drift or a step of a channel's sensor: its standard deviation, and what that adds at the samples."""
+    """An offset, a drift or a step of a channel's sensor.
+
+    `deviation` is its standard deviation, and `values` what that adds to the samples.
+    """
 
     name: str
     channel: str
@@ -98,13 +101,15 @@ class Observation:
     ) -> None:
         if not test.responses:
             raise InputError(
-                f"{test.name}: nothing of the block was measured: must have one at least of {', '.join(RESPONSES)}"
+                f"{test.name}: nothing of the block was measured: must have one at least of "
+                f"{', '.join(RESPONSES)}"
             )
         check_channels("noise", list(noise), test.responses)
         check_contact(test, theta, model.g)
         if not float(test.channels[TABLE].max()) > 0.0:
             raise InputError(
-                f"{test.name}: {TABLE}: never positive: the table does not drive the block downslope"
+                f"{test.name}: {TABLE}: never positive: the table does not drive the block "
+                "downslope"
             )
         offsets = check_channels("offset", offset, test.channels)
         self.drifts = (*check_channels("drift", drift, test.channels), *drifting)
@@ -206,7 +211,7 @@ class Observation:
         return np.asarray(self.test.channels[name] - self.added_by_lines[name])
 
     def look_at_jumps(self, solutions: Sequence[Floats]) -> None:
-        """Find the samples beside jumps of the block's acceleration, as computed for some parameters."""
+        """Find the samples beside jumps of the block's acceleration in computed solutions."""
         if "block_acceleration" in self.channels:
             row = self.channels.index("block_acceleration")
             beside = [self._next_to_jumps(each, self.noise[row]) for each in solutions]
@@ -258,7 +263,10 @@ class Observation:
 
 
 def _weights_of(values: Floats) -> Floats:
-    """Square roots of the samples' weights: readings of a level that repeats have one error and the weight of one."""
+    """Return square roots of the samples' weights.
+
+    Samples that repeat a level of the converter have one error, and together the weight of one.
+    """
     repeated = np.diff(values) == 0.0
     runs = np.append(repeated, False) | np.append(False, repeated)
     weights = np.ones(values.size)
@@ -268,5 +276,5 @@ def _weights_of(values: Floats) -> Floats:
 
 
 def runs_of(holds: NDArray[np.bool_]) -> list[slice]:
-    """The runs of samples at which something holds."""
+    """Return the runs of samples at which `holds` is True."""
     return [part for (part,) in ndimage.find_objects(ndimage.label(holds)[0])]

@@ -1,4 +1,4 @@
-"""Scaled parameters of the search, and the same of a test: Üy, λ, Δμ and lines of the table's sensor."""
+"""Scaled parameters of the search, and the readings of the model that they stand for."""
 
 import itertools
 import math
@@ -11,9 +11,6 @@ from slipsweep.model import equations
 from slipsweep.studies.calibration.measured_friction import Floats
 from slipsweep.studies.calibration.observation import Observation
 
-#: Accelerations of the table in a pulse, in parts of its peak, by which `Scale.reading` decides.
-_TO_PEAK = np.linspace(0.0, 1.0, 65)[1:]
-
 #: Bounds of the search: Üy over the table's peak A, λA/g, ln(1 + Δμ/μs).
 LEAST = np.array([1e-4, 0.0, 0.0])
 MOST = np.array([1.0, 20.0, 3.0])
@@ -21,6 +18,9 @@ MOST = np.array([1.0, 20.0, 3.0])
 #: Largest distance of an offset of the table's sensor, and of its drift over the test, from where
 #: the search begins, in parts of A.
 _TABLE_LINE = 0.5
+
+#: Accelerations of the table in a pulse, in parts of its peak, by which `Scale.reading` decides.
+_TO_PEAK = np.linspace(0.0, 1.0, 65)[1:]
 
 
 class Scale:

@@ -17,7 +17,7 @@ from scipy.optimize import brentq, least_squares
 from slipsweep.studies.calibration.measured_friction import QUANTILE, Floats
 from slipsweep.studies.calibration.scale import LEAST, MOST
 
-#: What decides the block's acceleration, of each test.
+#: What decides the block's acceleration, for each test (`Scale.reading`).
 Readings = tuple[str, ...]
 
 #: Rise of the sum of squares at the ends of a 95 % interval, and of the least of a branch by which
@@ -40,7 +40,7 @@ _NARROWLY = 20.0
 class Tried(NamedTuple):
     """A point that was tried, what decides the block's acceleration there, and the sum of squares.
 
-    `branch` are the readings but for "crossed", which is "held": the least is the same.
+    `branch` are the readings with "held" for "crossed", which have the same least.
     """
 
     point: Floats
@@ -50,7 +50,7 @@ class Tried(NamedTuple):
 
 
 class Search:
-    """Independent residuals and readings (`Scale.reading`) of points, and all points that were tried."""
+    """A search over points: their residuals and readings, and all points that were tried."""
 
     def __init__(
         self,
@@ -67,9 +67,10 @@ class Search:
         self._least: dict[Readings, float] = {}
 
     def residuals(self, point: Floats) -> Floats:
+        """Return the residuals of a point, and note that it was tried."""
         rest = self._residuals(point)
         readings = self._readings(point)
-        branch = tuple("held" if one == "crossed" else one for one in readings)
+        branch = tuple("held" if reading == "crossed" else reading for reading in readings)
         self.tried.append(Tried(np.array(point), readings, branch, float(rest @ rest)))
         self._least[branch] = min(self.tried[-1].square, self._least.get(branch, math.inf))
         return rest
@@ -80,28 +81,34 @@ class Search:
         return self.tried[-1]
 
     def square(self, point: Floats) -> float:
-        """Sum of squares."""
+        """Return the sum of squares of a point."""
         return self.at(point).square
 
     @property
     def least(self) -> float:
+        """Least sum of squares."""
         return min(self._least.values())
 
     @property
     def best(self) -> Floats:
-        return min(self.tried, key=lambda one: one.square).point
+        """Point of the least sum of squares."""
+        return min(self.tried, key=lambda tried: tried.square).point
 
-    def above(self, one: Tried) -> float:
-        """Sum of squares of a point above the least of its branch; infinite if the branch is refuted."""
-        least = self._least[one.branch]
-        return one.square - least if least - self.least <= REFUTED else math.inf
+    def above(self, tried: Tried) -> float:
+        """Return the sum of squares of a point above the least of its branch.
+
+        It is infinite if the branch is refuted.
+        """
+        least = self._least[tried.branch]
+        return tried.square - least if least - self.least <= REFUTED else math.inf
 
     def allowed(self) -> list[Tried]:
-        return [one for one in self.tried if self.above(one) <= SQUARE]
+        """Return the points that the data allow at 95 %."""
+        return [tried for tried in self.tried if self.above(tried) <= SQUARE]
 
     def outermost(self, side: int) -> Floats:
         """Return the allowed point of least (`side` −1) or largest (1) Üy."""
-        return max((one.point for one in self.allowed()), key=lambda point: side * point[0])
+        return max((tried.point for tried in self.allowed()), key=lambda point: side * point[0])
 
     def refuted_narrowly(self) -> list[Floats]:
         """Return the best points of readings that are refuted, but narrowly."""
@@ -114,7 +121,7 @@ class Search:
 
     def least_tried(self) -> float:
         """Return the least sum of squares of the points that were tried here."""
-        return min(one.square for one in self.tried)
+        return min(tried.square for tried in self.tried)
 
     def adopt(self, other: "Search") -> None:
         """Compare with the least of each branch that another search has found, too."""
@@ -122,11 +129,11 @@ class Search:
             self._least[branch] = min(square, self._least.get(branch, math.inf))
 
     def leaders(self) -> list[Floats]:
-        """The best point of each reading, the best of all first."""
-        found: dict[Readings, Floats] = {}
-        for number in np.argsort([one.square for one in self.tried]):
-            found.setdefault(self.tried[number].readings, self.tried[number].point)
-        return list(found.values())
+        """Return the best point of each reading, the best of all first."""
+        best: dict[Readings, Floats] = {}
+        for number in np.argsort([tried.square for tried in self.tried]):
+            best.setdefault(self.tried[number].readings, self.tried[number].point)
+        return list(best.values())
 
     def polish(
         self,
@@ -138,7 +145,7 @@ class Search:
         """Return the point of least squares over some parameters, by default all, from a start."""
         free = [*range(start.size)] if free is None else list(free)
         low, high = (bound[free] for bound in self._bounds)
-        found = least_squares(
+        fit = least_squares(
             lambda part: self.residuals(with_values(start, free, part)),
             np.clip(start[free], low + 1e-9, high - 1e-9),
             bounds=(low, high),
@@ -149,18 +156,18 @@ class Search:
             ftol=1e-6,
             xtol=1e-7,
         )
-        return with_values(start, free, found.x)
+        return with_values(start, free, fit.x)
 
     def follow(self, start: Floats) -> None:
         """Find the minimum that a start leads to."""
         first = len(self.tried)
         self.polish(start)
-        self.minima.append(min(self.tried[first:], key=lambda one: one.square))
+        self.minima.append(min(self.tried[first:], key=lambda tried: tried.square))
 
     def candidates(self) -> list[Floats]:
         """Return the best point of each reading, the best of all first, and other minima."""
         points = self.leaders()[:_MINIMA]
-        for minimum in sorted(self.minima, key=lambda one: one.square):
+        for minimum in sorted(self.minima, key=lambda tried: tried.square):
             near = min(abs(minimum.point[0] - point[0]) for point in points)
             if near > _APART and minimum.square < self.least + _HOPELESS and len(points) < _MINIMA:
                 points.append(minimum.point)
@@ -188,7 +195,7 @@ class Search:
         return sorted(set(onsets))
 
     def slopes(self, point: Floats) -> Floats:
-        """Derivatives of the residuals by the parameters, a column each."""
+        """Return the derivatives of the residuals by the parameters, a column each."""
         columns = []
         for at, step in enumerate(1e-5 * np.eye(point.size)):
             low = np.clip(point - step, *self._bounds)
@@ -197,44 +204,50 @@ class Search:
         return np.column_stack(columns)
 
     def intervals(self, widths: Floats) -> Floats:
-        """95 % intervals, (parameters, 2), from first guesses of half their widths; a bound where the data set none."""
+        """Return 95 % intervals, (parameters, 2), from first guesses of half their widths.
+
+        An end is a bound of the search where the data set no bound.
+        """
         for _ in range(3):
             least = self.least
-            found = np.array(
+            ends = np.array(
                 [[self.end(at, side, float(widths[at])) for side in (-1, 1)] for at in range(3)]
             )
             if self.least > least - 0.02:
                 break
             self.polish(self.best)
         # what the profile of one parameter passed through may lie beyond the end of another's
-        every = np.vstack([found.T, [one.point[:3] for one in self.allowed()]])
+        every = np.vstack([ends.T, [tried.point[:3] for tried in self.allowed()]])
         return np.column_stack([every.min(axis=0), every.max(axis=0)])
 
     def end(self, at: int, side: int, width: float) -> float:
-        """The lower (`side` −1) or upper (1) end of the interval of one parameter; the bound where the data set none.
+        """Return the lower (`side` −1) or upper (1) end of the interval of one parameter.
+
+        It is the bound of the search where the data set no bound.
 
         The profile of each reading is followed from the outermost point known, by `width` at first.
         """
         outermost: dict[Readings, Floats] = {}
-        for one in self.allowed():
-            if side * one.point[at] > side * outermost.setdefault(one.readings, one.point)[at]:
-                outermost[one.readings] = one.point
+        for tried in self.allowed():
+            point = outermost.setdefault(tried.readings, tried.point)
+            if side * tried.point[at] > side * point[at]:
+                outermost[tried.readings] = tried.point
         return max(
             (self._followed(at, side, width, point) for point in outermost.values()),
             key=lambda end: side * end,
         )
 
     def _followed(self, at: int, side: int, width: float, start: Floats) -> float:
-        """The end of a profile, from a point that the data allow."""
+        """Return the end of a profile, followed from a point that the data allow."""
         slopes = self.slopes(start)
-        others = [one for one in range(start.size) if one != at]
+        others = [number for number in range(start.size) if number != at]
         direction = np.eye(start.size)[at]
         direction[others] = -np.linalg.lstsq(slopes[:, others], slopes[:, at], rcond=1e-8)[0]
         path = {float(start[at]): start}
 
         @functools.cache
         def beyond(value: float) -> float:
-            """Root of the least rise of the sum of squares at this value, less that of the end."""
+            """Return the root of the least rise of the sum of squares, less that at an end."""
             near, *further = sorted(path.values(), key=lambda point: abs(point[at] - value))[:2]
             along = (near - further[0]) / (near - further[0])[at] if further else direction
             point, above = self._profiled(at, value, near, along)
@@ -259,7 +272,10 @@ class Search:
         )
 
     def _profiled(self, at: int, value: float, near: Floats, along: Floats) -> tuple[Floats, float]:
-        """The least rise of the sum of squares with one parameter held, and where: `along` leads from a point near."""
+        """Return the point of least sum of squares with one parameter held, and its rise.
+
+        The search begins at a point near, and along a direction from it.
+        """
         change = value - near[at]
         # and with the same friction at three accelerations of the table, in parts of its peak
         kept = [
@@ -270,22 +286,25 @@ class Search:
         starts = [
             near,
             near + change * along,
-            *(near + change * np.resize(one + [0.0] * (near.size - 3), near.size) for one in kept),
+            *(
+                near + change * np.resize(part + [0.0] * (near.size - 3), near.size)
+                for part in kept
+            ),
         ]
         first = len(self.tried)
         for start in starts:
             self.residuals(with_values(np.clip(start, *self._bounds), [at], value))
-        held = sorted(self.tried[first:], key=lambda one: one.square)
+        held = sorted(self.tried[first:], key=lambda tried: tried.square)
         if min(map(self.above, held)) > SQUARE:
-            others = [one for one in range(near.size) if one != at]
-            for one in held[:2]:
-                self.residuals(self.polish(one.point, others, most=6))
+            others = [number for number in range(near.size) if number != at]
+            for tried in held[:2]:
+                self.residuals(self.polish(tried.point, others, most=6))
         best = min(self.tried[first:], key=self.above)
         return best.point, self.above(best)
 
 
 def with_values(point: Floats, free: list[int], part: Floats | Sequence[float] | float) -> Floats:
-    """A point with other values of some parameters."""
+    """Return a point with other values of some parameters."""
     point = point.copy()
     point[free] = part
     return point

@@ -66,7 +66,7 @@ def uncertainty_table(estimated: Estimate) -> str:
 
 
 def newmark_tables(observation: Observation, coefficients: xr.Dataset) -> tuple[str, str]:
-    """Return both tables for a block of constant friction: Newmark's, by its kinetic coefficient."""
+    """Return both tables for a block of constant friction, which is Newmark's."""
     kinetic = coefficients["kinetic_friction"].item()
     lower, upper = coefficients["kinetic_friction_interval"].values
     g = observation.model.g

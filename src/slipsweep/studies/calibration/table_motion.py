@@ -1,7 +1,7 @@
 """The motion of a table behind the record of its acceleration: a spline, and its errors.
 
-The spline, its knots and the colour of the noise are those of the best Akaike criterion; why it is a
-spline, and why its knots are closer than the criterion says: docs/calibration.md.
+Knots and the colour of the noise are chosen by Akaike's criterion.  docs/calibration.md says why it
+is a spline, and why its knots are closer than by the criterion.
 """
 
 from collections.abc import Sequence
@@ -28,7 +28,8 @@ _DEGREE = 3
 _MOST_SHAPES = 150
 
 #: Samples for each coefficient that are tried, and by how many of these spacings the knots are
-#: closer than the criterion says: what a spline cannot follow is no noise, and enters no interval.
+#: closer than by the criterion: a motion that a spline cannot follow is no noise, and enters no
+#: interval.
 _SPACINGS = (64, 48, 32, 24, 16, 12, 10, 8, 6, 5, 4, 3, 2)
 _FINER = 2
 
@@ -60,7 +61,8 @@ class TableMotion(NamedTuple):
     `basis` @ `errors` are independent errors that it may have, one a column, each of one standard
     deviation; few functions in `basis` differ from 0 at a point.  `noise` is the standard deviation
     of the noise of the record, m/s², and `colour` the correlation of neighbouring samples of it.
-    The table is at rest until `begins`, s.  `rests` says if it rests long enough to show the colour.
+    The table is at rest until `begins`, s.  `rests` is True if it rests long enough to show the
+    colour.
     """
 
     times: Floats
