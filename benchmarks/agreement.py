@@ -24,7 +24,7 @@ SIZE = 32
 RECORDS = 4
 PLAIN = 5_000
 
-#: What the made-up records are held to.
+#: Name of the comparison of made-up records.
 BY_RECORD = "reference under a record"
 
 

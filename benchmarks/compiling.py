@@ -1,4 +1,4 @@
-"""What compiling the kernels takes: each first use in a process of its own, with an empty cache.
+"""Time of compiling the kernels: each first use in a process of its own, with an empty cache.
 
 ``python -m benchmarks.compiling`` writes compiling.md and prints it.  Times are processor time, and
 counted in those of `import numba, xarray` in the same process, so that they can be compared from

@@ -43,7 +43,7 @@ def rate_by(xp: Any) -> Callable[[Any, Any], Any]:
 
 
 def cells_of(group: Group) -> Any:
-    """What `rate_by` takes of each cell: A, Üy, μs, tan θ, μs + Δμ, λ, and 1 for the law."""
+    """Arguments of `rate_by` for each cell: A, Üy, μs, tan θ, μs + Δμ, λ, and 1 for the law."""
     theta, mu_s, amplitude = (
         xr.DataArray(group.inputs[name], dims="cell") for name in ("theta", "mu_s", "amplitude")
     )

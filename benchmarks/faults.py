@@ -1,4 +1,4 @@
-"""What a user meets, many times over: ``python -m benchmarks.faults`` writes results/faults.md.
+"""Faults that a user meets, many times over: ``python -m benchmarks.faults`` writes faults.md.
 
 The rounds are those of tests/support/fault_rounds.py; the first fault that is not survived ends it.
 """

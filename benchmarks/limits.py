@@ -25,7 +25,7 @@ BLOCKS = 1500
 TOGETHER = 50
 AMPLITUDES = 16_384
 
-#: Where the search ends, and between which values a measured Üy is drawn, m/s².
+#: Largest amplitude of the search, and bounds of a measured Üy, m/s².
 HIGHEST = 5.0 * G
 _MEASURED = (0.05, 3.0)
 

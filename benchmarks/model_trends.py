@@ -1,4 +1,4 @@
-"""What the model's numbers are worth: ``python -m benchmarks.model_trends``.
+"""Spread of the model's displacements with its inputs: ``python -m benchmarks.model_trends``.
 
 Writes experiments.md, the paper's two experiments under every choice of inputs that an engineer
 has; sensitivity.md, how far each input moves them; and model_trends.md, how often the displacement
@@ -131,7 +131,7 @@ def against(
 
 
 def trends(tiny: bool) -> str:
-    """How often the displacement goes against what is expected, by model, axis and sliding mode."""
+    """Share of steps in which the displacement goes against the trend, by model, axis and mode."""
     grid: dict[str, Any] = {name: values[:: 8 if tiny else 1] for name, values in SLOPE.items()}
     rows: list[list[object]] = []
     for text, options in MODELS.items():

@@ -16,7 +16,7 @@ from benchmarks.machine import arguments, measured_on, number, table
 from benchmarks.records import motions
 from slipsweep import Newmark, Record, Suite, sweep
 
-#: How many analyses were done, and the processor time that they took, s.
+#: Number of analyses, and their processor time, s.
 Timed = tuple[int, float]
 
 

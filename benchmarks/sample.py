@@ -54,7 +54,7 @@ class Group:
         return Group(self.regime, self.model, inputs, self.reference[cells])
 
     def displacement(self, solver: Any) -> Array:
-        """What a solver of `slipsweep.sweep` gives."""
+        """Displacements by a solver of `slipsweep.sweep`."""
         inputs = {
             name: values for name, values in self.inputs.items() if not np.isnan(values).all()
         }

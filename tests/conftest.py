@@ -1,4 +1,4 @@
-"""What all tests stand on."""
+"""Settings and fixtures of all tests."""
 
 import gc
 import os

@@ -1,4 +1,4 @@
-"""What is built to be installed has what it needs, and nothing that is not the project's."""
+"""The wheel and the source distribution have all files of the project, and no others."""
 
 import shutil
 import subprocess

@@ -1,4 +1,4 @@
-"""What README.md and docs/ say is so: their blocks run, their tables are those of the program."""
+"""README.md and docs/: their blocks run, and their tables are those of the program."""
 
 import contextlib
 import io

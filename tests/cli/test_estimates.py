@@ -1,4 +1,4 @@
-"""What is estimated is named in words wherever a number is shown."""
+"""Estimated friction is named in words wherever a number is shown."""
 
 from pathlib import Path
 from typing import Any

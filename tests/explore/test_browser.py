@@ -369,7 +369,7 @@ def test_the_summary_of_the_map_counts_its_cells_and_has_their_range(
 
 
 def test_the_other_layer_is_newmarks_block(opened: Any, result: Path) -> None:
-    """Its title and its colours."""
+    """Title and colours."""
     move(opened, 1, 0)
     choose_layer(opened, 1)
     assert text_of(opened, "map-title") == RESULTS["newmark_displacement"]["long_name"]

@@ -33,7 +33,7 @@ def excerpt_of(displacements: Any) -> Excerpt:
 def test_colours_span_five_decades_at_most(
     lowest: float, highest: float, decades: tuple[int, int]
 ) -> None:
-    """Of nine cells in ten; zeros, missing ones and the twentieth at each end do not count."""
+    """Those of nine cells in ten, without zeros, missing values and a twentieth at each end."""
     displacements = [0.0, np.nan, -1.0, 1e-15, *np.geomspace(lowest, highest, 100), 1e9]
     assert figures.decades(excerpt_of(displacements)) == decades
 

@@ -59,7 +59,7 @@ def test_as_many_threads_as_cores() -> None:
     [("NUMBA_NUM_THREADS", "1"), ("OMP_NUM_THREADS", "1"), ("OMP_NUM_THREADS", "1,4")],
 )
 def test_environment_limits_threads(name: str, value: str) -> None:
-    """Of a list, a number for each level of nesting, the first counts."""
+    """A list has a number for each level of nesting, of which the first counts."""
     assert count_in_process(**{name: value}) == 1
 
 
@@ -139,7 +139,7 @@ def test_an_error_in_a_part_ends_the_whole(
 
 @pytest.mark.parametrize("count", [1, 2])
 def test_an_error_in_a_tile_leaves_the_sweep(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its results would be memory that nothing has written."""
+    """The results of the tile would be memory that nothing has written."""
     monkeypatch.setattr(threads, "thread_count", lambda: count)
     solver_of = solvers.solver_of
 

@@ -1,4 +1,4 @@
-"""What a user chooses: the objects, their names, their options, and what files say of them."""
+"""Choices of model, waveform and solver: objects, names, options, and attributes of files."""
 
 import dataclasses
 import pickle

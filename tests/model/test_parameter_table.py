@@ -55,7 +55,7 @@ def test_signatures_have_the_parameters_of_the_table_in_its_order(
 
 @FUNCTIONS
 def test_no_parameter_has_to_be_given_by_python(function: Callable[..., Any]) -> None:
-    """What is missing is then an `InputError`, which names it, and not a `TypeError`."""
+    """A missing parameter is then an `InputError`, which names it, and not a `TypeError`."""
     parameters = inspect.signature(function).parameters.values()
     assert {one.default for one in parameters if one.name in ROWS} == {None}
 

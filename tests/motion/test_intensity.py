@@ -79,7 +79,7 @@ def test_the_mean_period_is_that_of_frequencies_up_to_20_hz() -> None:
 
 
 def test_a_constant_acceleration() -> None:
-    """Where the cubic of the energy degenerates."""
+    """The cubic of the energy degenerates there."""
     for last in (2.0, 2.0 + 1e-13, 2.0 + 1e-5):
         computed = measures([0.0, 10.0], [2.0, last])
         assert computed["significant_duration"] == pytest.approx(9.0, rel=1e-5)

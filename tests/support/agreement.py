@@ -45,7 +45,7 @@ REGIMES = (
     "anything",
 )
 
-#: What may be given instead of its estimate, and how often it is.
+#: Parameters that may be given instead of their estimates, and the share of cells that have them.
 GIVEN = {
     "yield_acceleration": 0.6,
     "decay_rate": 0.35,
@@ -65,7 +65,7 @@ FLOORS = {
     "reference": 1e-9,
 }
 
-#: What steps may be wrong by where friction decays in a layer that is thinner than a step.
+#: Error that steps may have if friction decays in a layer that is thinner than a step.
 THIN_LAYER = 2e-3
 
 #: Times as many steps: errors of first order fall to 1/16, of second order and more to 1/16 and

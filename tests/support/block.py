@@ -90,7 +90,7 @@ class Block:
         self.slips = 0
 
     def state(self) -> tuple[Any, ...]:
-        """What the motion that follows depends on, but for u."""
+        """State on which the motion that follows depends, without u."""
         return self.v, self.b if self.v else mpfr(0), self.ground, self.sliding, self.reset
 
     def same(self, one: tuple[Any, ...], other: tuple[Any, ...]) -> bool:
@@ -232,7 +232,7 @@ class Block:
         return not self.sliding
 
     def meet(self, x: mpfr, beyond: mpfr) -> None:
-        """What happens as the base comes to x, not falling, on its way to `beyond`."""
+        """Update the state as the base comes to x, not falling, on its way to `beyond`."""
         if self.reset and beyond > self.onset:
             self.recoupled_late |= self.v > 0
             self.sliding = self.v > 0

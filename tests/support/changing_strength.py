@@ -43,7 +43,7 @@ class Block:
 
 
 class Motion(NamedTuple):
-    """What the block has done; NaN where it does not come to rest."""
+    """Results of the motion; NaN if the block does not come to rest."""
 
     displacement: float
     largest_velocity: float

@@ -16,7 +16,7 @@ SLIPSWEEP = (sys.executable, "-m", "slipsweep")
 
 
 class Ended(NamedTuple):
-    """How a command ended, and what it printed."""
+    """Exit status and output of a command."""
 
     status: int
     output: str

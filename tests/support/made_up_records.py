@@ -45,7 +45,7 @@ def write_motion(path: Path, seed: int, count: int, interval: float) -> None:
 #: Accelerations that meet each other.
 LEVELS = (0.0, 0.0, 0.53, 1.03, 2.07, 3.1, 4.1, 5.03, 6.55)
 
-#: What no difference exceeds, some ten times what a thousand have shown; of displacements of 1e-9
+#: Largest difference allowed, some ten times that of a thousand records; of displacements of 1e-9
 #: m, 1e-19 m.
 SEEN = 1e-10
 

@@ -154,7 +154,7 @@ def _remarks(ratio: mpfr, upslope: bool, governs: bool, model: str, given: dict[
 
 
 def _eq4_below_yield(block: Block, rises: Iterable[tuple[mpfr, mpfr]]) -> bool:
-    """Whether Üg exceeds Uy, and Eq. 4 stays below it at all that the base rises through."""
+    """True if Üg exceeds Uy, and Eq. 4 stays below it at all values that the base rises through."""
     interface = block.interface
     values = [
         x

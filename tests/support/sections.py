@@ -99,7 +99,7 @@ class Section:
         return int(gmpy2.sign(self.first + self.last))
 
     def phase(self, ground: mpfr) -> mpfr:
-        """Where the base's acceleration is `ground`, a value between the first and the last."""
+        """Return the phase at which Üg is `ground`, a value between the first and the last."""
         rounding = epsilon() * 2**20 * abs(self.last - self.first)
         for end, value in ((self.start, self.first), (self.end, self.last)):
             if abs(ground - value) <= rounding:

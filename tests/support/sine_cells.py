@@ -120,7 +120,7 @@ def times_bound(cells: Drawn) -> Array:
 
 
 def _spread(one: Drawn, cells: NDArray[np.intp], name: str, right: Array) -> Array:
-    """How far a result of some cells moves with their inputs."""
+    """Change of a result of some cells with their inputs."""
     picked = {key: values[cells] for key, values in one.cells.items()}
     apart = np.zeros(cells.size)
     for a, b in MOVES:

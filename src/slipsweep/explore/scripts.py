@@ -22,7 +22,7 @@ MODULES = (
     "start",
 )
 
-#: What a script in the page cannot have: it has no files to import from.
+#: Statements and words that a script in the page cannot have: it has no files to import from.
 _IMPORT_OR_EXPORT = re.compile(r"^import [^;]*;\n|^export ", re.MULTILINE)
 
 
