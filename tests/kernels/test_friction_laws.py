@@ -51,7 +51,7 @@ def decaying_with_both(block: Any, ground: float, velocity: float, slip: float) 
 def solve_falling(
     cells: Any, options: Any, path: Any, blocks: Any, steps: Any, log: Any, results: Any
 ) -> None:
-    law = step.Law(falling, True, False, True, step.unlimited)
+    law = step.Law(falling, True, False, True, step.unlimited, step_cells.run_out_by_strength)
     step_cells.solve_cells(law, cells, options, path, blocks, steps, log, results)
 
 
@@ -59,7 +59,7 @@ def solve_falling(
 def solve_rising(
     cells: Any, options: Any, path: Any, blocks: Any, steps: Any, log: Any, results: Any
 ) -> None:
-    law = step.Law(rising, True, False, True, step.unlimited)
+    law = step.Law(rising, True, False, True, step.unlimited, step_cells.run_out_by_strength)
     step_cells.solve_cells(law, cells, options, path, blocks, steps, log, results)
 
 
@@ -67,7 +67,7 @@ def solve_rising(
 def solve_decaying(
     cells: Any, options: Any, path: Any, blocks: Any, steps: Any, log: Any, results: Any
 ) -> None:
-    law = step.Law(decaying_with_both, True, False, False, step.unlimited)
+    law = step.Law(decaying_with_both, True, False, False, step.unlimited, step_cells.run_out)
     step_cells.solve_cells(law, cells, options, path, blocks, steps, log, results)
 
 

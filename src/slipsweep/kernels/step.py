@@ -73,10 +73,11 @@ class Law(NamedTuple):
     """A friction law μ(block, Üg, v, s).
 
     v is the relative velocity in m/s (of Newmark's block the speed in the direction in which it
-    slides), s = ∫|v|dt the slip in m.  `knows_motion` says whether μ
-    depends on v or s, `knows_slip` whether on s.  Newmark's block keeps its yield acceleration, or
-    (`is_strength`) has that of Coulomb with μ.  `longest_step`, of the block and the rate of V, is
-    the longest step that resolves the law (`unlimited`, if the default steps do).
+    slides), s = ∫|v|dt the slip in m.  `knows_motion` says whether μ depends on v or s,
+    `knows_slip` whether on s.  Newmark's block keeps its yield acceleration, or (`is_strength`) has
+    that of Coulomb with μ.  `longest_step`, of the block and the rate of V, is the longest step that
+    resolves the law (`unlimited`, if the default steps do).  `run_out` takes a block to rest after
+    the shaking (`step_cells.run_out`, or with a strength `step_cells.run_out_by_strength`).
     """
 
     friction: Callable[..., float]
@@ -84,6 +85,7 @@ class Law(NamedTuple):
     knows_slip: bool
     is_strength: bool
     longest_step: Callable[..., float]
+    run_out: Callable[..., None]
 
 
 #: A block: its parameters, how it is stepped, and its motion up to now.

@@ -180,7 +180,7 @@ def walk_cycles(law: Law, block: Block, path: Path, steps: Steps, log: np.ndarra
 
 
 @scalar
-def run_out(block: Block, path: Path, log: np.ndarray) -> None:
+def run_out(law: Law, block: Block, path: Path, steps: Steps, log: np.ndarray) -> None:
     """After the shaking Eq. 12 takes V to 0, but that of continuous sliding under a waveform."""
     end_positive_half_wave(block)
     valueless = block.validity & NO_VALUE != 0
@@ -195,7 +195,7 @@ def run_out(block: Block, path: Path, log: np.ndarray) -> None:
     attenuate(block, log, end + 2.0 * math.pi * max(path.repeats - 1, 0), math.inf)
 
 
-@single
+@scalar
 def run_out_by_strength(law: Law, block: Block, path: Path, steps: Steps, log: np.ndarray) -> None:
     """After the shaking the strength of Newmark's block takes V to 0, or never does.
 
@@ -344,10 +344,7 @@ def solve_cells(
             if not block.recorded and yield_governs_wave(law, block, path):
                 block.validity = without_estimates(block.validity | YIELD_GOVERNS)
             walk_cycles(law, block, path, steps, log)
-            if law.is_strength and block.is_newmark:
-                run_out_by_strength(law, block, path, steps, log)
-            else:
-                run_out(block, path, log)
+            law.run_out(law, block, path, steps, log)
         validity = settled(block.validity, block.displacement, peak)
         if block.slides_up:
             validity &= ~UPSLOPE  # no caution for a block that slides both ways
@@ -369,7 +366,7 @@ def solve_steps(
     `cells` are of dtype `STEP_CELL`; `blocks`, (1,), says how they are stepped (`blocks_of`); `log`
     is of dtype `LOG`, empty if no history is asked for; `results` is (`block.RESULTS`, cells).
     """
-    law = Law(exponential_friction, False, False, False, unlimited)
+    law = Law(exponential_friction, False, False, False, unlimited, run_out)
     solve_cells(law, cells, options, path, blocks, steps, log, results)
 
 

@@ -15,7 +15,7 @@ from slipsweep.jit.decorators import registered
 from slipsweep.jit.elementary import exp
 from slipsweep.kernels.block import Options
 from slipsweep.kernels.step import UP, Law, Steps
-from slipsweep.kernels.step_cells import solve_cells
+from slipsweep.kernels.step_cells import run_out_by_strength, solve_cells
 from slipsweep.motion.paths import Path
 
 #: A block of `kernels.step`.
@@ -101,7 +101,7 @@ def solve_weakening(
     results: np.ndarray,
 ) -> None:
     """Step cells whose strength falls with slip; arguments as of `step_cells.solve_steps`."""
-    law = Law(weakening_friction, True, True, True, weakening_step)
+    law = Law(weakening_friction, True, True, True, weakening_step, run_out_by_strength)
     solve_cells(law, cells, options, path, blocks, steps, log, results)
 
 
@@ -116,5 +116,5 @@ def solve_rate(
     results: np.ndarray,
 ) -> None:
     """Step cells whose strength depends on velocity; arguments as of `step_cells.solve_steps`."""
-    law = Law(rate_friction, True, False, True, rate_step)
+    law = Law(rate_friction, True, False, True, rate_step, run_out_by_strength)
     solve_cells(law, cells, options, path, blocks, steps, log, results)
