@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import registered
-from slipsweep.kernels import step, step_cells
+from slipsweep.kernels import step, step_cells, step_newmark
 from slipsweep.kernels.block import EQ12, LITERAL, NEWMARK, RESULTS, Options
 from slipsweep.motion.cutting import path_of_waveform
 from slipsweep.motion.waveforms import Sine
@@ -51,7 +51,7 @@ def decaying_with_both(block: Any, ground: float, velocity: float, slip: float) 
 def solve_falling(
     cells: Any, options: Any, path: Any, blocks: Any, steps: Any, log: Any, results: Any
 ) -> None:
-    law = step.Law(falling, True, False, True, step.unlimited, step_cells.run_out_by_strength)
+    law = step_newmark.newmark_law(falling, True, False, step.unlimited)
     step_cells.solve_cells(law, cells, options, path, blocks, steps, log, results)
 
 
@@ -59,7 +59,7 @@ def solve_falling(
 def solve_rising(
     cells: Any, options: Any, path: Any, blocks: Any, steps: Any, log: Any, results: Any
 ) -> None:
-    law = step.Law(rising, True, False, True, step.unlimited, step_cells.run_out_by_strength)
+    law = step_newmark.newmark_law(rising, True, False, step.unlimited)
     step_cells.solve_cells(law, cells, options, path, blocks, steps, log, results)
 
 
@@ -67,7 +67,7 @@ def solve_rising(
 def solve_decaying(
     cells: Any, options: Any, path: Any, blocks: Any, steps: Any, log: Any, results: Any
 ) -> None:
-    law = step.Law(decaying_with_both, True, False, False, step.unlimited, step_cells.run_out)
+    law = step_cells.paper_law(decaying_with_both, True, False, step.unlimited)
     step_cells.solve_cells(law, cells, options, path, blocks, steps, log, results)
 
 
