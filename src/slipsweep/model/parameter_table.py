@@ -450,7 +450,7 @@ class Quantity(NamedTuple):
 _RAMP = Quantity(None, Bound(0.0, MOST_RAMP, f"0 to {MOST_RAMP}", f"0 to {MOST_RAMP}"))
 _SHARE = Bound(_ABOVE_0, _BELOW_1, "a number between 0 and 1", "between 0 and 1")
 
-#: What else is given and has bounds: targets, options of choices, settings.
+#: Other numbers with bounds: targets, options of choices, settings.
 QUANTITIES = {
     "displacement": Quantity("m", POSITIVE),
     "threshold": Quantity("m", NOT_NEGATIVE),
