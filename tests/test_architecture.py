@@ -1,4 +1,4 @@
-"""Data walks one way: a folder imports only those before it, and no two modules import each other."""
+"""Folders import only those before them, and no two modules import each other."""
 
 import ast
 import graphlib
@@ -46,7 +46,7 @@ TREES = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in NAM
 
 
 def imported(name: str) -> Iterator[str]:
-    """Modules of the package that a module imports, at its head, in a function, or for its annotations only."""
+    """Modules of the package that a module imports, at its head, in a function, or for types."""
     for node in ast.walk(TREES[name]):
         if isinstance(node, ast.Import):
             found = [alias.name for alias in node.names]

@@ -47,7 +47,7 @@ NOT_RUN = (
 
 
 class Block(NamedTuple):
-    """A fenced block: its language, the line it begins in, its text, and the file that the reader saves it as."""
+    """A fenced block: language, first line, text, and the file that the reader saves it as."""
 
     language: str
     line: int
@@ -120,7 +120,7 @@ def output_of(arguments: list[str], folder: Path) -> str:
 
 
 def printed_by(text: str, where: str, folder: Path) -> str:
-    """What a reader's program prints, run in this process, which has imported everything already."""
+    """Output of a reader's program, run in this process, which has imported everything already."""
     assert "slipsweep." not in text or "import slipsweep" in text, where
     output = io.StringIO()
     errors = io.StringIO()
@@ -303,7 +303,7 @@ def test_comparison_with_the_paper() -> None:
 
 
 def test_numbers_of_the_paper_sweep() -> None:
-    """340 mm and 0.299 m/s, 162 mm and 0.227 m/s: with the rounded friction above static of Table 2."""
+    """340 mm and 0.299 m/s, 162 mm and 0.227 m/s: with the rounded friction of Table 2."""
     text = " ".join(section("docs/tutorial.md", "## Against the paper").split())
     for experiment, frequency, decay_rate, delta_mu in (
         (STICK_SLIP, 1.8, 2.70, 0.09),

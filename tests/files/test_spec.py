@@ -81,7 +81,11 @@ def test_every_word_reaches_the_sweep(table: str, key: str) -> None:
 
 def test_options_reach_the_sweep() -> None:
     text = """
-    model = {rise = "literal", recoupling = "integrate", yield_acceleration = 0.5, structure_frequency = 3, g = 9.8}
+    model.rise = "literal"
+    model.recoupling = "integrate"
+    model.yield_acceleration = 0.5
+    model.structure_frequency = 3
+    model.g = 9.8
     excitation.cycles = 5
     solver = {method = "step", steps_per_cycle = 512, rule = "simpson"}
     output.variables = ["validity"]
@@ -178,7 +182,8 @@ BAD = {
     ),
     "waveform": (
         GOOD + '[excitation]\nwaveform = "sawtooth"',
-        "excitation.waveform = 'sawtooth': must be one of 'sine', 'cosine', 'triangle', 'square', 'harmonics'",
+        "excitation.waveform = 'sawtooth': must be one of 'sine', 'cosine', 'triangle', "
+        "'square', 'harmonics'",
     ),
     "variable": (
         GOOD + '[output]\nvariables = ["validty"]',
@@ -312,7 +317,7 @@ def test_the_sweeps_that_come_along_are_good(path: Path) -> None:
 
 
 def test_the_measured_interface_takes_no_estimate_and_holds_the_tests() -> None:
-    """Its two cases, at the amplitude and frequency of their tests, are those of sweeps/paper.toml."""
+    """The cases of sweeps/paper.toml, at the amplitude and frequency of their tests."""
     sweeps = Path(__file__).parents[2] / "sweeps"
     plan = spec.load(sweeps / "interface.toml").plan()
     table = plan.solve()

@@ -1,4 +1,4 @@
-"""Counts of results: sliding modes, flags, ratios to Newmark's block and Sobol indices, of tables made by hand."""
+"""Counts of tables made by hand: sliding modes, flags, ratios to Newmark's block, Sobol indices."""
 
 import math
 
@@ -71,7 +71,7 @@ def test_codes_of_other_cells_are_refused() -> None:
 
 
 def test_shares_of_samples_are_summed_over_grid_points() -> None:
-    """Modes, flags and what has no value; the input with the largest total index, not first-order one."""
+    """Modes, flags, cells without a value; the input with the largest total index."""
     first = np.array([[0.6, 0.3], [0.5, 0.4], [np.nan, np.nan]])
     total = np.array([[0.5, 0.8], [0.3, 0.9], [np.nan, np.nan]])
     found = tally_of(
