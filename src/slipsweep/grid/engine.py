@@ -21,7 +21,7 @@ from slipsweep.grid.chunks import Chunk, grid_chunks, sizes_within, variables_wi
 from slipsweep.grid.flexible import flag_flexible_blocks
 from slipsweep.grid.inputs import Problem
 from slipsweep.kernels.block import UNSOLVED, Cell
-from slipsweep.kernels.step import STRENGTH_FIELDS
+from slipsweep.kernels.step_cells import STRENGTH_FIELDS
 from slipsweep.model import variables
 from slipsweep.model.options import changing_strength, slides_both_ways
 from slipsweep.model.parameters import number_text

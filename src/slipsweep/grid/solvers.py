@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeGuard
 import numpy as np
 
 from slipsweep.grid.inputs import Problem
-from slipsweep.kernels import block, history, newmark, newmark_record, step, strength
+from slipsweep.kernels import block, history, newmark, newmark_record, step, step_cells, strength
 from slipsweep.kernels.grid import CELL, find_parameters
 from slipsweep.kernels.newmark_history import fill_newmark_history
 from slipsweep.kernels.sine.solve import solve_sine
@@ -103,15 +103,29 @@ def solver_of(problem: Problem, wants_peak: bool, polarity: float) -> Solver:
 
 
 def sine_solver(motion: Sine, options: block.Options) -> Solver:
-    """Return the solver of the paper's block under a plain sine: batches, then the walk."""
+    """Return the solver of the paper's block under a plain sine.
+
+    Batches solve several cells at once.  Cells that they leave are solved one by one, and what is
+    left of them by the walk.
+    """
+
+    def solve_in_batches(cells: np.ndarray, results: np.ndarray) -> None:
+        solve_sine(cells, options, False, results)
+
+    def solve_alone(cells: np.ndarray, results: np.ndarray) -> None:
+        solve_sine(cells, options, True, results)
+
+    def walk(cells: np.ndarray, results: np.ndarray) -> None:
+        solve_walk(cells, options, cutting.path_of_waveform(motion), *workspace_of(), results)
 
     def solve(cells: np.ndarray, results: np.ndarray) -> None:
-        if solve_sine(cells, options, results):
+        solve_in_batches(cells, results)
+        for solve_others in (solve_alone, walk):
             unsolved = np.flatnonzero(results[ROWS["validity"]] == block.UNSOLVED)
-            path = cutting.path_of_waveform(motion)
-            walked = np.empty((len(block.Motion._fields), unsolved.size))
-            solve_walk(cells[unsolved], options, path, *workspace_of(), walked)
-            results[:, unsolved] = walked
+            if unsolved.size:
+                others = np.empty((len(block.Motion._fields), unsolved.size))
+                solve_others(cells[unsolved], others)
+                results[:, unsolved] = others
 
     return Solver(solve, ROWS)
 
@@ -134,7 +148,7 @@ def step_solver(problem: Problem, options: block.Options, polarity: float) -> So
     def solve(cells: np.ndarray, results: np.ndarray) -> None:
         take_steps(cells, no_log, results)
 
-    return Solver(solve, ROWS_WITH_EXTREMES, step.STEP_CELL)
+    return Solver(solve, ROWS_WITH_EXTREMES, step_cells.STEP_CELL)
 
 
 def newmark_solver(problem: Problem, options: block.Options, polarity: float) -> Solver:
@@ -150,9 +164,10 @@ def newmark_solver(problem: Problem, options: block.Options, polarity: float) ->
         newmark.solve_newmark(cells, options.g, options.wants_peak, path, blocks, results)
 
     def solve_in_batches(cells: np.ndarray, results: np.ndarray) -> None:
-        if not solve_sine(cells, options, results):
-            return
+        solve_sine(cells, options, False, results)
         unsolved = np.flatnonzero(results[ROWS["validity"]] == block.UNSOLVED)
+        if not unsolved.size:
+            return
         others = np.full(unsolved.size, math.nan, newmark.NEWMARK_CELL)
         for name in newmark.DOWNSLOPE_FIELDS:
             others[name] = cells[name][unsolved]
@@ -212,7 +227,7 @@ def stepper_of(
 ) -> Callable[[np.ndarray, np.ndarray, np.ndarray], Any]:
     """Return a function that solves cells in steps; it returns the block of the last cell.
 
-    Its arguments are cells of dtype `step.STEP_CELL`, a log, and results.
+    Its arguments are cells of dtype `step_cells.STEP_CELL`, a log, and results.
     """
     assert isinstance(problem.solver, Step)
     rule = int(StepRule[problem.solver.rule.upper()])
@@ -221,11 +236,11 @@ def stepper_of(
     is_record = isinstance(problem.excitation, Record)
     on_piece = math.ceil(count / STEPS_PER_SAMPLE) if is_record else 0
     path = path_under(problem.excitation, polarity)
-    steps = step.steps_of(path, rule, count, on_piece)
+    steps = step_cells.steps_of(path, rule, count, on_piece)
     take_steps = stepping_kernel(problem.model)
 
     def solve(cells: np.ndarray, log: np.ndarray, results: np.ndarray) -> Any:
-        blocks = step.blocks_of(rule, count, on_piece)
+        blocks = step_cells.blocks_of(rule, count, on_piece)
         take_steps(cells, options, path, blocks, steps, log, results)
         return blocks[0]
 
@@ -237,7 +252,7 @@ def stepping_kernel(model: Model) -> Callable[..., Any]:
     changing = changing_strength(model)
     if changing == "weakening":
         return strength.solve_weakening
-    return strength.solve_rate if changing == "rate" else step.solve_steps
+    return strength.solve_rate if changing == "rate" else step_cells.solve_steps
 
 
 def is_plain_sine(motion: Any) -> TypeGuard[Sine]:

@@ -38,7 +38,7 @@ FRICTION_ESTIMATED = int(Validity.FRICTION_ESTIMATED)
 MAY_NOT_STOP = int(Validity.MAY_NOT_STOP)
 NOT_AT_REST = int(Validity.NOT_AT_REST)
 
-#: Not a flag of results: an event was not found (`events`), and the engine raises an error.
+#: Not a flag of results: a root was not found (`roots`), and the engine raises an error.
 UNSOLVED = 1 << 14
 NO_VALUE = int(VALUELESS) | UNSOLVED
 

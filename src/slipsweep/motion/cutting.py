@@ -113,7 +113,7 @@ def _sign_changes(derivative: Derivative, lowest: int, edges: Exact) -> list[Exa
 
     The highest order is searched first.  Between two sign changes of the next derivative this one
     is monotone, so that it has one zero at most; its bracket is then narrowed by Newton's
-    iteration, guarded as in `kernels.events`.
+    iteration, guarded as in `kernels.roots`.
     """
     zeros_by_order: list[Exact] = []
     for order in range(_HIGHEST, lowest - 1, -1):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError
 from slipsweep.grid import engine, plans, resources, solvers
 from slipsweep.grid import inputs as grid_inputs
-from slipsweep.kernels import step
+from slipsweep.kernels import step, step_cells
 from slipsweep.kernels.block import RESULTS
 from slipsweep.kernels.history import History
 from slipsweep.model import equations as eq
@@ -183,7 +183,9 @@ class _History:
         """Return the steps that are taken, of dtype `step.LOG`."""
         polarity = 1.0 if self.record is None else float(self.inputs["polarity"])
         stepper = solvers.stepper_of(self.problem, self.options, polarity)
-        cells = np.full((1, len(step.STEP_CELL.names or ())), math.nan).view(step.STEP_CELL)[:, 0]
+        cells = np.full((1, len(step_cells.STEP_CELL.names or ())), math.nan).view(
+            step_cells.STEP_CELL
+        )[:, 0]
         for name, value in self.fields.items():
             cells[name] = value
         results = np.empty((len(RESULTS), 1))
@@ -197,7 +199,7 @@ class _History:
         """Fill in a history by steps."""
         log = self._logged()
         table[0] = self.fields["amplitude"] * values_at(self.path, phases)
-        table[1], table[3], table[4] = step.samples_of(log, phases, table[0])
+        table[1], table[3], table[4] = step_cells.samples_of(log, phases, table[0])
         table[2] = eq.mobilised_friction(
             table[0],
             table[1],
