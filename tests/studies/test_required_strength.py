@@ -10,8 +10,8 @@ import xarray as xr
 import slipsweep
 from slipsweep import InputError, Newmark, Record, Sine, Suite, required_strength, sweep
 from slipsweep.model.variables import StrengthStatus
+from slipsweep.studies.required_strength import plan_strength
 from slipsweep.studies.sampling import Sampling
-from slipsweep.studies.strength import plan_strength
 from tests.support.made_up_records import few_pulses
 
 G = 9.81

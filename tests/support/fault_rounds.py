@@ -52,7 +52,7 @@ OUTPUTS = ("out.nc", "out.zarr")
 #: Processes begin as copies of one that has imported what the command needs.
 _PROCESSES = multiprocessing.get_context("forkserver")
 _PROCESSES.set_forkserver_preload(
-    ["slipsweep.cli.run", "slipsweep.charts.solved", "dask.array", "pint", "zarr", __name__]
+    ["slipsweep.cli.run", "slipsweep.studies.cautions", "dask.array", "pint", "zarr", __name__]
 )
 
 

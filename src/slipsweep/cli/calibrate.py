@@ -93,7 +93,7 @@ def friction(
     given = measured.given(g)
     least = None if threshold is None else quantity("--threshold", threshold, "m s-2", g)
     paths = outputs.check_outputs(output, overwrite, reads=[test], endings=(".nc", *FIGURES))
-    from slipsweep.studies.friction import measured_friction
+    from slipsweep.studies.calibration.measured_friction import measured_friction
 
     table = measured_friction(test, **given, g=g, rest=rest, threshold=least)
     common.write_outputs(paths, overwrite, table)
@@ -135,10 +135,11 @@ def calibrate(
     paths = outputs.check_outputs(
         output, overwrite, reads=tests, endings=(".nc", ".toml", *FIGURES)
     )
-    from slipsweep.studies import calibration
+    from slipsweep.studies.calibration.calibrate import calibrate
+    from slipsweep.studies.calibration.sweep_tables import sweep_file_text
 
-    table = calibration.calibrate(tests, **given, model=model, cycles=cycles)
-    text = calibration.sweep_file_text(table.attrs["model_table"], table.attrs["uncertainty_table"])
+    table = calibrate(tests, **given, model=model, cycles=cycles)
+    text = sweep_file_text(table.attrs["model_table"], table.attrs["uncertainty_table"])
     common.write_outputs(paths, overwrite, table, toml=lambda: text)
     if quiet:
         return
@@ -182,7 +183,7 @@ def _echo_parameters(table: "xr.Dataset") -> None:
     import pandas as pd
 
     from slipsweep.motion.shaking import RESPONSES
-    from slipsweep.studies.likelihood import SOUGHT
+    from slipsweep.studies.calibration.observation import SOUGHT
 
     # no value where the data do not determine one
     rows = [

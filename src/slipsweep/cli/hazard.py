@@ -75,8 +75,8 @@ def hazard(
         fragility,
         openquake_fragility,
         published_fragility,
-        read_hazard_curve,
     )
+    from slipsweep.studies.hazard_curve import read_hazard_curve
 
     beside = options.compared(equations, magnitude) or None
     paths = outputs.check_outputs(

@@ -24,10 +24,10 @@ def info(
     magnitude: options.Magnitude = None,
 ) -> None:
     """Show what a result holds, how it was made, shares of flags, and statistics of a suite."""
-    from slipsweep.charts import solved
     from slipsweep.files import jobs, motions, opening, selection, storing
     from slipsweep.motion.records import Record
     from slipsweep.motion.suites import Suite
+    from slipsweep.studies.cautions import slides_back_text
     from slipsweep.studies.result_counts import tally_of
 
     beside = options.compared(equations, magnitude)
@@ -53,7 +53,7 @@ def info(
     except InputError as error:
         echo(f"modes and flags not counted: {error}")
     common.echo_unsound(table)
-    if slides_back := solved.slides_back_text(table, recorded):
+    if slides_back := slides_back_text(table, recorded):
         echo(f"caution: {slides_back}")
     has_statistics = table.sizes.get("motion", 1) > 1 or "displacement_quantile" in table
     if displacement and not (has_statistics or beside):

@@ -89,10 +89,10 @@ def run(
     large: Large,
 ) -> None:
     """Compute a sweep and write it to a netCDF file or a Zarr store."""
-    from slipsweep.charts import solved
     from slipsweep.files import jobs, opening, spec, storing
     from slipsweep.grid.resources import grid_text, size_text
     from slipsweep.jit import compiling
+    from slipsweep.studies.cautions import slides_back_text, unsound_texts, why_nothing_slides
 
     checked = spec.load(sweep)
     # the solver of the sweep file keeps its options
@@ -115,7 +115,7 @@ def run(
     def remarks(results: "xr.Dataset") -> dict[str, str]:
         nonlocal judged
         before = time.perf_counter()
-        texts = solved.unsound_texts(results)
+        texts = unsound_texts(results)
         judged += time.perf_counter() - before
         return {common.UNSOUND: "\n".join(texts)} if texts else {}
 
@@ -156,9 +156,9 @@ def run(
         echo(f"the same motion under several labels: {template.attrs['duplicate_motions']}")
     common.echo_tally(report.tally)
     result = opening.read_result(report.path)
-    echo(*filter(None, [solved.why_nothing_slides(template, report.tally)]))
+    echo(*filter(None, [why_nothing_slides(template, report.tally)]))
     common.echo_unsound(result)
-    if slides_back := solved.slides_back_text(result, checked.recorded):
+    if slides_back := slides_back_text(result, checked.recorded):
         echo(f"caution: {slides_back}")
     common.echo_suite(result, most=20)
     echo(f"{report.path}  {size_text(storing.nbytes_of(report.path))}")

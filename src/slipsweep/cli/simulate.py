@@ -57,8 +57,8 @@ def simulate(
         raise InputError(
             f"--waveform {excitation.name}: not allowed with --record, which is the shaking itself"
         )
-    from slipsweep.charts import solved
     from slipsweep.motion.records import read_record
+    from slipsweep.studies.cautions import slides_back_text
     from slipsweep.studies.history import simulate as simulated
 
     try:
@@ -112,7 +112,7 @@ def simulate(
     counts = (name for name in variables.RECORD_COUNTS if name in table)
     echo(*(f"{name.replace('_', ' '):<24}{table[name].item()}" for name in counts))
     echo(f"inputs                  {table.attrs['friction_inputs']}")
-    if slides_back := solved.slides_back_text(table):
+    if slides_back := slides_back_text(table):
         echo(f"{'caution':<24}{slides_back}")
     for kind in variables.FlagKind:
         flags = validity & variables.flags_of(kind)

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from slipsweep.charts.sheet import is_log
 from slipsweep.charts.slices import Result
-from slipsweep.charts.solved import with_amplitude
 from slipsweep.errors import InputError
 from slipsweep.files.opening import open_result
 from slipsweep.files.selection import axis_labels, axis_numbers
@@ -26,6 +25,7 @@ from slipsweep.model.variables import (
     UNFLAGGED_TEXT,
     has_signed_displacements,
 )
+from slipsweep.studies.solved_again import with_amplitude
 from slipsweep.studies.suite_statistics import suite_statistics
 
 #: Results that can colour the map, in the order in which they are offered, and in words that fit on

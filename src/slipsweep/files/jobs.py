@@ -127,7 +127,7 @@ def limit_job(
 
 def strength_job(spec: SweepSpec, displacement: float | list[float], of: str) -> Job:
     """Return the job of `slipsweep limit --of`: strengths that displacements (m) require."""
-    from slipsweep.studies import strength  # imports numba
+    from slipsweep.studies import required_strength  # imports numba
 
     # the strength is solved for, and the parameters of the paper's friction law play no part
     dropped = ["mu_s", "phi", "yield_acceleration", "yield_coefficient"]
@@ -135,7 +135,7 @@ def strength_job(spec: SweepSpec, displacement: float | list[float], of: str) ->
     if of == "yield_coefficient" and not slides_both_ways(spec.model):
         dropped.append("theta")  # a yield coefficient needs no interface
     with named(spec.source):
-        plan = strength.plan_strength(
+        plan = required_strength.plan_strength(
             displacement,
             _without(spec.inputs, dropped),
             of=of,
@@ -144,4 +144,4 @@ def strength_job(spec: SweepSpec, displacement: float | list[float], of: str) ->
             sampling=spec.sampling,
         )
     options = {"--displacement": displacement, "--of": of}
-    return Job(spec, plan, strength.TITLE, options)
+    return Job(spec, plan, required_strength.TITLE, options)

@@ -1,6 +1,7 @@
 """Cells that are stepped (`kernels.step`): their blocks, cycle after cycle, their results and histories."""
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -435,7 +436,7 @@ def samples_of(
     at = np.searchsorted(rows["time"], phases, side="right") - 1
     # a block rests from the end of a step on, if the next one begins from rest
     goes_on = np.append(rows["velocity"][1:] != 0.0, rows["phase"][-1] == CONTINUOUS)[at]
-    row = rows[at]
+    row: Any = rows[at]
     step = row["step"]
     since = phases - row["time"]
     rests = (since > step) & ~goes_on

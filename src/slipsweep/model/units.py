@@ -95,3 +95,8 @@ def show(value: object) -> str:
     """Return a value as TOML writes it, on one line of at most 60 characters."""
     text = json.dumps(value, ensure_ascii=False, default=str)
     return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def in_mm(metres: Any) -> Any:
+    """Return displacements in mm, the unit in which charts and tables have them, from m."""
+    return 1000.0 * metres

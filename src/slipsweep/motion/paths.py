@@ -197,18 +197,18 @@ def _reset_held(pieces: np.ndarray) -> np.ndarray:
 def _rises(pieces: np.ndarray) -> np.ndarray:
     """Return the ranges of w > 0 that the base rises through, each as large as possible."""
     rising = (pieces["top"] > 0.0) & ((pieces["last"] >= pieces["first"]) | pieces["jumps"])
-    ranges: list[list[float]] = []
-    lows = np.where(
-        pieces["jumps"] & (pieces["last"] < pieces["first"]), pieces["top"], pieces["first"]
-    )
-    for low, high in sorted(
-        {*zip(lows[rising].tolist(), pieces["top"][rising].tolist(), strict=True)}
-    ):
-        if ranges and low <= ranges[-1][1]:
-            ranges[-1][1] = max(ranges[-1][1], high)
-        else:
-            ranges.append([low, high])
-    return np.array(ranges, np.float64).reshape(-1, 2)
+    if not rising.any():
+        return np.empty((0, 2))
+    falls = pieces["jumps"] & (pieces["last"] < pieces["first"])
+    lows = np.where(falls, pieces["top"], pieces["first"])[rising]
+    highs = pieces["top"][rising]
+    order = np.argsort(lows)
+    lows = lows[order]
+    reached = np.maximum.accumulate(highs[order])
+    parted = lows[1:] > reached[:-1]
+    starts = lows[np.append(True, parted)]
+    ends = reached[np.append(parted, True)]
+    return np.column_stack([starts, ends])
 
 
 def values_at(path: Path, phases: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -227,9 +227,10 @@ def values_at(path: Path, phases: NDArray[np.float64]) -> NDArray[np.float64]:
     begin = pieces["begin"][p]
     tau = np.clip(begin + (inside - pieces["start"][p]), begin, pieces["finish"][p])
     offset = pieces["slope"][p] * tau
-    curved = pieces["degree"][p] > 1
-    offset[curved] = 0.0
-    for coefficient in path.base.curves["coefficients"][pieces["curve"][p][curved]].T[::-1]:
-        offset[curved] = (offset[curved] + coefficient) * tau[curved]
+    curved = np.flatnonzero(pieces["degree"][p] > 1)
+    if curved.size:
+        offset[curved] = 0.0
+        for coefficient in path.base.curves["coefficients"][pieces["curve"][p[curved]]].T[::-1]:
+            offset[curved] = (offset[curved] + coefficient) * tau[curved]
     shaken = (pieces["start"][0] <= inside) & (inside < pieces["end"][-1])
     return np.where(shaken, pieces["top"][p] + offset, 0.0)

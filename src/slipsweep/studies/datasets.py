@@ -1,4 +1,4 @@
-"""`sweep` and `friction_parameters`: parameters as scalars, axes or DataArrays in, an xarray.Dataset out."""
+"""`sweep` and `friction_parameters`: parameters in, an xarray.Dataset out."""
 
 import functools
 import inspect
@@ -23,22 +23,27 @@ from slipsweep.motion.waveforms import WAVEFORMS, Waveform
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-#: What a caller may give for a parameter, for `polarity`, and as the motion of the base.
+#: Types of a parameter, of `polarity`, and of the motion of the base.
 Values = float | Sequence[float] | np.ndarray | xr.DataArray
 Signs = int | Sequence[int] | str
 Excitation = Waveform | Record | Suite | str
 
 
 def naming_choices(function: Function) -> Function:
-    """Say of an option of the shaking, the model or the solver that was given to the function itself where it goes."""
-    known = inspect.signature(function).parameters
+    """Decorate a function: explain where an option of a choice goes that was passed to it.
+
+    For example ``cycles=5`` belongs into ``excitation=Sine(cycles=5)`` (TypeError).
+    """
+    accepted = inspect.signature(function).parameters
 
     @functools.wraps(function)
     def call(*arguments: Any, **options: Any) -> Any:
         for name, family in itertools.product(options, (WAVEFORMS, MODELS, SOLVERS)):
-            if name not in known and name in family.options:
+            if name not in accepted and name in family.options:
                 owner = next(
-                    one for one in family.choices if name in {f.name for f in declared(one)}
+                    choice
+                    for choice in family.choices
+                    if name in {option.name for option in declared(choice)}
                 )
                 raise TypeError(
                     f"{function.__name__}() has no argument {name!r}: give "
@@ -135,8 +140,9 @@ def sweep(
 
     References
     ----------
-    .. [1] B. C. Mendez, M. P. Romo and E. Botero (2012), "Linearization of rigid body dynamics on frictional interfaces
-       under harmonic loading", Soil Dynamics and Earthquake Engineering 32, 152-158,
+    .. [1] B. C. Mendez, M. P. Romo and E. Botero (2012), "Linearization of rigid body dynamics on
+       frictional interfaces under harmonic loading", Soil Dynamics and Earthquake Engineering 32,
+       152-158,
        https://doi.org/10.1016/j.soildyn.2011.08.007
 
     Examples
@@ -153,8 +159,8 @@ def sweep(
     plan = plan_sweep(
         inputs, excitation=excitation, model=model, solver=solver, variables=variables
     )
-    found = plan.solve(progress) if chunks is None else _lazy(plan, chunks)
-    return found.assign_coords(brought_coordinates(inputs, plan.coords, plan.names))
+    results = plan.solve(progress) if chunks is None else _lazy(plan, chunks)
+    return results.assign_coords(brought_coordinates(inputs, plan.coords, plan.names))
 
 
 @with_parameters
@@ -170,7 +176,9 @@ def friction_parameters(
     delta_mu: Values | None = None,
     minimum_friction: Values | None = None,
 ) -> xr.Dataset:
-    """Friction parameters of the model over a grid: those of Eqs. 7-11 of the paper (reference [1] of `sweep`), and λ.
+    """Friction parameters of the model over a grid: those of Eqs. 7-11 of the paper, and λ.
+
+    The paper is reference [1] of `sweep`.
 
     Returns
     -------
@@ -194,10 +202,12 @@ def friction_parameters(
     The stick-slip test of the paper's Table 1:
 
     >>> import slipsweep
-    >>> found = slipsweep.friction_parameters(theta=5, mu_s=0.38, amplitude=3.55, yield_acceleration=0.59)
-    >>> print(f"{found.limiting_acceleration.item():.2f} m/s2, {found.acceleration_ratio.item():.2f}")
-    4.43 m/s2, 0.80
-    >>> slipsweep.SlidingMode(found.sliding_mode.item()).name
+    >>> results = slipsweep.friction_parameters(5, 0.38, 3.55, yield_acceleration=0.59)
+    >>> results.limiting_acceleration.round(2).item()  # m/s2
+    4.43
+    >>> results.acceleration_ratio.round(2).item()
+    0.8
+    >>> slipsweep.SlidingMode(results.sliding_mode.item()).name
     'STICK_SLIP'
     """
     inputs = given_inputs(locals())
@@ -208,7 +218,7 @@ def friction_parameters(
 def brought_coordinates(
     inputs: Inputs, coords: Mapping[str, xr.Variable], results: Collection[str]
 ) -> dict[Hashable, xr.Variable]:
-    """Coordinates that the DataArrays among the parameters brought along; they must agree."""
+    """Return the coordinates of DataArrays among the parameters, which must agree (InputError)."""
     brought: dict[Hashable, xr.Variable] = {}
     dims = {dim for variable in coords.values() for dim in variable.dims}
     for parameter, array in inputs.items():
@@ -220,44 +230,46 @@ def brought_coordinates(
         ]
         for name, coordinate in array.reset_index(stacked).coords.items():
             variable = coordinate.variable.to_base_variable()
-            known = brought.get(name)
+            other = brought.get(name)
             # a parameter of that name is the coordinate, and labels the dimension of that name
             if name in array.dims and name in coords and name != parameter:
-                known = coords[str(name)]
-            if known is not None and not known.equals(variable):
+                other = coords[str(name)]
+            if other is not None and not other.equals(variable):
                 raise InputError(
                     f"{parameter}: its coordinate {name!r} differs from that of another parameter"
                 )
             if name in results:
                 raise InputError(
-                    f"{parameter}: its coordinate {name!r} has the name of a result: must have another"
+                    f"{parameter}: its coordinate {name!r} has the name of a result: must have "
+                    "another"
                 )
             if name in dims and name not in coords and name not in variable.dims:
                 raise InputError(
-                    f"{parameter}: its coordinate {name!r} has the name of a dimension: must have another"
+                    f"{parameter}: its coordinate {name!r} has the name of a dimension: must have "
+                    "another"
                 )
             brought[name] = variable
     return {name: variable for name, variable in brought.items() if name not in coords}
 
 
 def _lazy(plan: Plan, chunks: Any) -> xr.Dataset:
-    """The results as dask arrays; "auto" leaves frequency, which costs next to nothing, whole."""
+    """Return the results as dask arrays; "auto" does not cut the frequency, which costs little."""
     from dask.array.core import normalize_chunks
 
     dims = ", ".join(plan.sizes)
-    wanted = chunks
+    requested = chunks
     if isinstance(chunks, str) and chunks == "auto":
-        wanted = dict.fromkeys(plan.sizes, "auto") | {"frequency": -1}
-    if isinstance(wanted, Mapping):
-        for dim in {*wanted} - {*plan.sizes, "frequency"}:
+        requested = dict.fromkeys(plan.sizes, "auto") | {"frequency": -1}
+    if isinstance(requested, Mapping):
+        for dim in {*requested} - {*plan.sizes, "frequency"}:
             raise InputError(
                 f"chunks = {shown(chunks)}: {dim!r} is not a dimension; they are {dims}"
             )
-        wanted = tuple(wanted.get(dim, -1) for dim in plan.sizes)
+        requested = tuple(requested.get(dim, -1) for dim in plan.sizes)
     try:
-        lengths = normalize_chunks(wanted, tuple(plan.sizes.values()), dtype=np.dtype("f8"))
+        lengths = normalize_chunks(requested, tuple(plan.sizes.values()), dtype=np.dtype("f8"))
         if (isinstance(chunks, int) and chunks == 0) or any(
-            one <= 0 for own in lengths for one in own
+            length <= 0 for of_dim in lengths for length in of_dim
         ):
             raise ValueError
     except (TypeError, ValueError, ArithmeticError, AttributeError, LookupError):

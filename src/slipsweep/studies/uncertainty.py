@@ -1,4 +1,4 @@
-"""Uncertain inputs: samples of a sweep's parameters, and the statistics of the displacement at every grid point.
+"""`sample`: statistics of the displacement at every grid point under uncertain inputs.
 
 Parameters are drawn once (`sampling`), and the same draws serve every grid point: curves over an
 axis are then as smooth as the model, and differences between grid points are not blurred by
@@ -43,13 +43,12 @@ SENSITIVITY: dict[str, tuple[str, ...]] = {
     "sensitivity_status": (),
 }
 
-#: Those that depend on the frequency even where the samples do not.
+#: Statistics that depend on the frequency even where the samples do not.
 _BY_FREQUENCY = ("displacement_quantile", "mean_displacement", "exceedance_probability")
 
 _MODES = tuple(mode for mode in variables.SlidingMode if mode is not variables.SlidingMode.MISSING)
 
-#: Parameters that have an estimate where they are not given, in the order in which each needs those
-#: before it.
+#: Parameters that have an estimate where they are not given.  Each may need those before it.
 _ESTIMATED = ("yield_acceleration", "minimum_friction", "delta_mu", "decay_rate")
 
 #: Names that no dimension and no coordinate of a caller's may have.
@@ -113,10 +112,10 @@ def sample(
 
         - ``distribution``: the name of a continuous distribution of scipy.stats (or a frozen one),
           whose shape parameters, ``loc`` and ``scale`` are further keys;
-        - ``kind``: "absolute" (a draw is the value; by default), "factor" (it multiplies the value at the grid point
-          or, for `yield_acceleration`, and without a record for `decay_rate`, `delta_mu` and
-          `minimum_friction`, the estimate) or "offset" (it is added to it).  A parameter that is
-          drawn with "absolute" must not be given;
+        - ``kind``: "absolute" (a draw is the value; by default), "factor" (it multiplies the value
+          at the grid point or, for `yield_acceleration`, and without a record for `decay_rate`,
+          `delta_mu` and `minimum_friction`, the estimate) or "offset" (it is added to it).  A
+          parameter that is drawn with "absolute" must not be given;
         - ``units``: of the draws, if not the parameter's own; not with factors.
     samples : int
         Samples a grid point; a power of 2 for Sobol's.
@@ -145,21 +144,21 @@ def sample(
     Dataset
         Over the grid:
 
-        - `displacement_quantile` (m), dimension `quantile`, `mean_displacement` (m) and `exceedance_probability`,
-          dimension `threshold` (m): P(u > threshold).  They are of the samples that have a value;
-          NaN where none has. Statically unstable samples, and those that do not come to rest after
-          the shaking, have no value, and are counted as exceeding every threshold.  Of a block that
-          slides both ways they are of ``|u|``.
-        - `mode_share` (not under a record), dimension `mode`, `flag_share`, dimension `flag`, and `valueless_share`: of
-          all samples, how many slide in which mode, have which flag, and have no value.  They do
-          not depend on the frequency (of a record: the time scale) and have no such dimension (but
-          with `displacement_amplitude`).
-        - with `sensitivity`, `first_order_index` and `total_index`, dimension `input`: the part of the variance of the
-          displacement that an input makes by itself, and with all that depends on it; their 95 %
-          intervals by a bootstrap, `first_order_interval` and `total_interval`, dimension `bound`.
-          They lack the frequency as shares do.  Inputs that are correlated count as one, named as
-          in "decay_rate+delta_mu".  There are none (NaN) where `sensitivity_status` is 1 (all runs
-          have the same displacement) or 2 (a run has no value).
+        - `displacement_quantile` (m), dimension `quantile`, `mean_displacement` (m) and
+          `exceedance_probability`, dimension `threshold` (m): P(u > threshold).  They are of the
+          samples that have a value; NaN where none has. Statically unstable samples, and those that
+          do not come to rest after the shaking, have no value, and are counted as exceeding every
+          threshold.  Of a block that slides both ways they are of ``|u|``.
+        - `mode_share` (not under a record), dimension `mode`, `flag_share`, dimension `flag`, and
+          `valueless_share`: of all samples, how many slide in which mode, have which flag, and have
+          no value.  They do not depend on the frequency (of a record: the time scale) and have no
+          such dimension (but with `displacement_amplitude`).
+        - with `sensitivity`, `first_order_index` and `total_index`, dimension `input`: the part of
+          the variance of the displacement that an input makes by itself, and with all that depends
+          on it; their 95 % intervals by a bootstrap, `first_order_interval` and `total_interval`,
+          dimension `bound`.  They lack the frequency as shares do.  Inputs that are correlated
+          count as one, named as in "decay_rate+delta_mu".  There are none (NaN) where
+          `sensitivity_status` is 1 (all runs have the same displacement) or 2 (a run has no value).
 
     Raises
     ------
@@ -173,8 +172,8 @@ def sample(
 
     References
     ----------
-    .. [1] A. Saltelli et al. (2010), "Variance based sensitivity analysis of model output", Computer Physics
-       Communications 181, 259-270, https://doi.org/10.1016/j.cpc.2009.09.018
+    .. [1] A. Saltelli et al. (2010), "Variance based sensitivity analysis of model output",
+       Computer Physics Communications 181, 259-270, https://doi.org/10.1016/j.cpc.2009.09.018
 
     Examples
     --------
@@ -209,16 +208,16 @@ def sample(
 def plan_samples(
     sampling: Sampling, inputs: grid_inputs.Inputs, *, excitation: Any, model: Any, solver: Any
 ) -> "SamplePlan":
-    """Plan of the samples of a grid, drawn and checked; errors as of `slipsweep.sample`."""
+    """Return the plan of the samples of a grid, drawn and checked; errors as of `sample`."""
     problem = grid_inputs.check_problem(excitation, model, solver)
     check_drawn(sampling, tuple(inputs), problem)
     drawn = sampling.distributions
-    absolute = [name for name, one in drawn.items() if one.kind == "absolute"]
+    absolute = [name for name, distribution in drawn.items() if distribution.kind == "absolute"]
     # 0.5: a value that every parameter may have
     planned = {**inputs, **dict.fromkeys(absolute, 0.5)}
-    wanted = ["permanent_displacement"]
+    names = ["permanent_displacement"]
     plan = plans.plan_sweep(
-        planned, excitation=excitation, model=model, solver=solver, variables=wanted
+        planned, excitation=excitation, model=model, solver=solver, variables=names
     )
     tangents = [name for angle, name in variables.ANGLES.items() if angle in drawn]
     dropped = {*absolute, *tangents}
@@ -226,52 +225,97 @@ def plan_samples(
         "displacement_amplitude" in plan.coords
         and {"displacement_amplitude", "frequency"} & dropped
     ):
-        dropped.add("amplitude")  # A = ω²d of no value is nobody's amplitude
+        dropped.add("amplitude")  # without values of d and f there is no A = ω²d
     coords = {name: variable for name, variable in plan.coords.items() if name not in dropped}
     sampling.check_draws(coords)
     about = options.friction_inputs(
-        problem.model.name, coords, {name: one.kind for name, one in drawn.items()}
+        problem.model.name,
+        coords,
+        {name: distribution.kind for name, distribution in drawn.items()},
     )
     title = variables.counted_text(TITLE, plan.attrs)
     attrs = {**plan.attrs, "title": title, "friction_inputs": about, **sampling.attributes}
     return SamplePlan(sampling, problem, coords, attrs)
 
 
-def check_drawn(sampling: Sampling, given: Sequence[str], problem: grid_inputs.Problem) -> None:
-    """Refuse to draw what the model or the shaking does not have, what is given as well, and factors on nothing."""
-    if "structure_frequency" in given:
+def check_drawn(
+    sampling: Sampling, given_names: Sequence[str], problem: grid_inputs.Problem
+) -> None:
+    """Raise InputError for draws that cannot be used.
+
+    They are draws of a parameter that the model or the shaking does not have, that is given as
+    well, or of which a factor or an offset has no value to act on.
+    """
+    if "structure_frequency" in given_names:
         raise InputError(
-            "structure_frequency: not allowed with uncertain inputs: the displacement does not depend on it"
+            "structure_frequency: not allowed with uncertain inputs: the displacement does not "
+            "depend on it"
         )
     recorded = not isinstance(problem.excitation, Waveform)
     kinds = (variables.WAVEFORM_INPUTS, variables.RECORD_INPUTS)
     foreign = {*kinds[not recorded]} - {*kinds[recorded]}
-    for name, one in sampling.distributions.items():
+    for name, distribution in sampling.distributions.items():
         key = sampling.key(name)
         friction_law = name in ("decay_rate", "delta_mu", "minimum_friction")
         if name in foreign:
             raise InputError(f"{key}: not allowed with {'a Record' if recorded else 'a waveform'}")
         if friction_law and isinstance(problem.model, options.Newmark):
             raise InputError(f"{key}: not allowed with Newmark's block, which has no friction law")
-        if one.kind == "absolute" and name in given:
+        if distribution.kind == "absolute" and name in given_names:
             raise InputError(
                 f'{key}: is drawn, but {name} is given as well: remove it, or give kind = "factor" '
                 'or "offset" to draw about what is given'
             )
         # under a record each pulse has estimates of its own, but for Coulomb's yield acceleration
-        estimated = friction_law and one.kind == "factor" and not recorded
+        estimated = friction_law and distribution.kind == "factor" and not recorded
         if name == "yield_acceleration":
-            estimated = "yield_coefficient" not in {*given, *sampling.distributions}
-        if one.kind != "absolute" and name not in given and not estimated:
+            estimated = "yield_coefficient" not in {*given_names, *sampling.distributions}
+        if distribution.kind != "absolute" and name not in given_names and not estimated:
             raise InputError(
-                f'{key}: kind = "{one.kind}" needs {name} given, to which it is relative'
+                f'{key}: kind = "{distribution.kind}" needs {name} given, to which it is relative'
             )
 
 
-class SamplePlan(plans.Plan):
-    """The samples of every grid point: cells along `solved` dimensions, frequencies along `scaled` ones.
+def _check_pooled(
+    sampling: Sampling, sizes: Mapping[str, int], clock_values: xr.Variable | None, clock: str
+) -> None:
+    """Raise InputError for a pooled dimension that the grid lacks, or that the clock varies along.
 
-    Along `pooled` dimensions all values meet all draws, and make up the samples of one grid point.
+    `clock` is the frequency or the time scale: the samples of a grid point serve all its values.
+    """
+    for dim in sampling.over:
+        key = f"{sampling.keys}over = {parameters.shown(dim)}"
+        if dim not in sizes:
+            raise InputError(
+                f"{key}: must be a dimension of the grid: {', '.join(sizes) or 'there is none'}"
+            )
+        if clock_values is not None and dim in clock_values.dims:
+            raise InputError(f"{key}: must not be a dimension of {clock}")
+
+
+def _obeys_scaling_law(
+    sampling: Sampling,
+    problem: grid_inputs.Problem,
+    coords: Mapping[str, xr.Variable],
+    clock: str,
+) -> bool:
+    """Return True if u = W/ω² holds with the same W for all frequencies (or time scales).
+
+    It does not hold where the strength of the shaking changes with the time, where an offset is
+    drawn on the frequency, and where friction changes while the block slides.
+    """
+    drawn = sampling.distributions
+    timed = {"displacement_amplitude", "pgv", "arias_intensity"} & {*coords, *drawn}
+    has_offset = clock in drawn and drawn[clock].kind == "offset"
+    changes = options.changing_strength(problem.model) is not None
+    return not (timed or has_offset or changes)
+
+
+class SamplePlan(plans.Plan):
+    """The samples of every grid point: cells along `solved` dimensions, frequencies along `scaled`.
+
+    Along `pooled` dimensions all values are combined with all draws, and make up the samples of one
+    grid point.
     """
 
     def __init__(
@@ -281,18 +325,14 @@ class SamplePlan(plans.Plan):
         coords: dict[str, xr.Variable],
         attrs: dict[str, Any],
     ) -> None:
-        self.sampling = sampling
-        self.problem = problem
-        self.coords = coords
         is_wave = isinstance(problem.excitation, Waveform)
         drawn = sampling.distributions
         #: Results, and their dimensions in addition to those of the grid.
         self.results = STATISTICS | (SENSITIVITY if sampling.sensitivity else {})
         if not is_wave:
             del self.results["mode_share"]
-        self.names = tuple(self.results)
         clock = "frequency" if is_wave else "time_scale"
-        inputs = self.inputs = grid_inputs.inputs_of(problem, coords)
+        inputs = grid_inputs.inputs_of(problem, coords)
         for angle in variables.ANGLES:
             if angle in coords and angle in drawn:
                 inputs[angle] = coords[angle]
@@ -300,51 +340,50 @@ class SamplePlan(plans.Plan):
             inputs.pop("amplitude", None)  # A = ω²d
         sizes = grid_inputs.grid_sizes(inputs)
         plans.check_dimensions(sizes, coords, _TAKEN)
-        for dim in sampling.over:
-            key = f"{sampling.keys}over = {parameters.shown(dim)}"
-            if dim not in sizes:
-                raise InputError(
-                    f"{key}: must be a dimension of the grid: {', '.join(sizes) or 'there is none'}"
-                )
-            if (
-                clock in coords and dim in coords[clock].dims
-            ):  # the samples of a grid point serve all its frequencies
-                raise InputError(f"{key}: must not be a dimension of {clock}")
-        # strengths that change with the time, f + offset, and friction that changes while the block
-        # slides depend on the frequency itself: no scaling law then
-        unscaled = (
-            bool({"displacement_amplitude", "pgv", "arias_intensity"} & {*coords, *drawn})
-            or (clock in drawn and drawn[clock].kind == "offset")
-            or options.changing_strength(problem.model) is not None
+        _check_pooled(sampling, sizes, coords.get(clock), clock)
+        pooled = {dim: sizes[dim] for dim in sampling.over}
+        points = {dim: size for dim, size in sizes.items() if dim not in pooled}
+        # the dimensions of the grid that the samples depend on
+        scaling = _obeys_scaling_law(sampling, problem, coords, clock)
+        dims = grid_inputs.grid_sizes(
+            {name: values for name, values in inputs.items() if name != clock or not scaling}
         )
-        own = grid_inputs.grid_sizes(
-            {name: one for name, one in inputs.items() if name != clock or unscaled}
-        )
-        self.pooled = {dim: sizes[dim] for dim in sampling.over}
-        self.sizes = {dim: size for dim, size in sizes.items() if dim not in self.pooled}
-        self.scaled = {dim: size for dim, size in self.sizes.items() if dim not in own}
-        self.solved = {dim: size for dim, size in self.sizes.items() if dim in own}
-        #: What displacements are divided by the square of; where it is not 1, cells are solved at
-        #: 1.
+        scaled = {dim: size for dim, size in points.items() if dim not in dims}
+        solved = {dim: size for dim, size in points.items() if dim in dims}
+        #: The variable by whose square displacements are divided.  Where it is not 1, cells are
+        #: solved at a frequency of 1 Hz, or a time scale of 1.
         self.frequency = xr.Variable((), 1.0)
-        if self.scaled:
+        if scaled:
             self.frequency = inputs[clock] if is_wave else 1.0 / inputs[clock]
             inputs[clock] = xr.Variable((), 1.0)
-        self.attrs = attrs | ({"pooled": resources.grid_text(self.pooled)} if self.pooled else {})
-        #: Samples and runs of a grid point, all draws with all that is pooled.
-        self.samples, self.runs = (
-            n * math.prod(self.pooled.values()) for n in (sampling.samples, sampling.runs)
-        )
-        #: How many points are solved together: in 30 MB, yet enough to keep the kernels busy.
+        pooled_values = math.prod(pooled.values())
+        #: Samples and runs of a grid point: all draws with all that is pooled.
+        self.samples = sampling.samples * pooled_values
+        self.runs = sampling.runs * pooled_values
+        #: Number of points that are solved together: in 30 MB, yet enough to keep the kernels busy.
         self.points = max(1_000_000 // self.runs, 1)
-        # as of any plan
-        self.together = tuple(self.scaled)
-        self.cost = max(1.0, solvers.cost_of(problem) * self.runs / math.prod(self.scaled.values()))
-        run = 24 * len(drawn) + self.points * (8 * (2 + len(drawn)) + 11)
-        self.memory = self.runs * run + solvers.memory_of(problem)
+        self.sampling = sampling
+        self.problem = problem
+        self.inputs = inputs
+        self.pooled = pooled
+        self.scaled = scaled
+        self.solved = solved
+        cost = max(1.0, solvers.cost_of(problem) * self.runs / math.prod(scaled.values()))
+        bytes_per_run = 24 * len(drawn) + self.points * (8 * (2 + len(drawn)) + 11)
+        memory = self.runs * bytes_per_run + solvers.memory_of(problem)
         if sampling.sensitivity:
-            self.cost += 30_000  # cells of the cycle solver: the time of the bootstrap
-            self.memory += SOBOL_MEMORY + 64 * sampling.runs
+            cost += 30_000  # cells of the cycle solver: the time of the bootstrap
+            memory += SOBOL_MEMORY + 64 * sampling.runs
+        super().__init__(
+            sizes=points,
+            coords=coords,
+            tasks=(),
+            names=tuple(self.results),
+            attrs=attrs | ({"pooled": resources.grid_text(pooled)} if pooled else {}),
+            cost=cost,
+            together=tuple(scaled),
+            memory=memory,
+        )
 
     @property
     def cells(self) -> int:
@@ -352,19 +391,19 @@ class SamplePlan(plans.Plan):
         return math.prod(self.solved.values()) * self.runs
 
     def part(self, chunk: chunks.Chunk) -> "SamplePlan":
-        """The plan cut to a chunk of its grid."""
+        """Return the plan cut to a chunk of its grid."""
         return SamplePlan(
             self.sampling, self.problem, chunks.variables_within(chunk, self.coords), self.attrs
         )
 
     def template(self) -> xr.Dataset:
-        """The statistics with their dimensions and coordinates but no values: zeros that take no memory."""
+        """Return the statistics with their coordinates but no values: zeros that take no memory."""
         values: dict[str, Any] = {
             "quantile": self.sampling.quantiles,
             "threshold": self.sampling.thresholds,
             "mode": np.array(_MODES, np.int8),
             "flag": np.array(variables.Validity, np.int16),
-            "input": ["+".join(one) for one in self.sampling.independent],
+            "input": ["+".join(entry) for entry in self.sampling.independent],
             "bound": [*ENDS],
         }
         own_dims = dict.fromkeys(dim for dims in self.results.values() for dim in dims)
@@ -372,10 +411,10 @@ class SamplePlan(plans.Plan):
             dim: xr.Variable((dim,), values[dim], variables.STATISTIC_COORDINATES[dim])
             for dim in own_dims
         }
-        lengths = self.sizes | {dim: one.size for dim, one in own_coords.items()}
+        lengths = self.sizes | {dim: entry.size for dim, entry in own_coords.items()}
         results = {}
-        for name, own in self.results.items():
-            dims = (*(self.sizes if name in _BY_FREQUENCY else self.solved), *own)
+        for name, more_dims in self.results.items():
+            dims = (*(self.sizes if name in _BY_FREQUENCY else self.solved), *more_dims)
             zero = np.zeros((), variables.RESULT_DTYPES.get(name, "float64"))
             results[name] = (
                 dims,
@@ -385,7 +424,7 @@ class SamplePlan(plans.Plan):
         return xr.Dataset(results, self.coords | own_coords, self.attrs).drop_dims(self.pooled)
 
     def solve(self, progress: Callable[[int], None] | None = None) -> xr.Dataset:
-        """Solve the samples, a million at a time, and reduce them to what `slipsweep.sample` returns."""
+        """Solve the samples, a million at a time, and return their statistics."""
         parameters.check_progress(progress)
         table = self.template()
         resources.check_memory(
@@ -406,7 +445,7 @@ class SamplePlan(plans.Plan):
     def _statistics(
         self, chunk: chunks.Chunk, progress: Callable[[int], None] | None
     ) -> dict[str, NDArray[Any]]:
-        """The results at the grid points of a chunk, (solved, frequencies, own dimension)."""
+        """Return the statistics at grid points of a chunk, (solved, frequencies, own dimension)."""
         sampling = self.sampling
         sizes = {dim: cut.stop - cut.start for dim, cut in chunk.items()}
         inputs, drawn = self._drawn(chunk, sizes)
@@ -431,8 +470,8 @@ class SamplePlan(plans.Plan):
         def reduce(point: int) -> None:
             values = np.sort(displacement[point])
             values = values[: np.searchsorted(values, np.nan)]  # NaN goes last
-            # these slide without any shaking, or do not stop after it: their displacement has no
-            # value and exceeds every threshold
+            # blocks that slide without any shaking, or do not stop after it, have no displacement;
+            # they exceed every threshold
             unstable = np.count_nonzero(flags[point] & variables.ENDLESS.value)
             if values.size + unstable:
                 above = values.size - np.searchsorted(
@@ -450,7 +489,7 @@ class SamplePlan(plans.Plan):
         for wrong in frequency[np.isinf(moved).any(axis=-1)][:1]:
             text = parameters.number_text(float(wrong))
             raise InputError(f"frequency or 1 / time_scale = {text}: must be nearer to 1")
-        found = {
+        statistics = {
             "displacement_quantile": moved[..., :-1],
             "mean_displacement": moved[..., -1],
             "exceedance_probability": exceeding,
@@ -460,32 +499,32 @@ class SamplePlan(plans.Plan):
             "valueless_share": np.isnan(displacement).mean(axis=-1),
         }
         for codes in modes:
-            found["mode_share"] = np.stack(
+            statistics["mode_share"] = np.stack(
                 [np.mean(codes == mode, axis=-1) for mode in _MODES], axis=-1
             )
         if sampling.sensitivity:
-            found |= sobol_indices(sampling, runs[0])
-        return found
+            statistics |= sobol_indices(sampling, runs[0])
+        return statistics
 
     def _drawn(
         self, chunk: chunks.Chunk, sizes: dict[str, int]
     ) -> tuple[dict[str, xr.Variable], dict[str, int]]:
-        """Inputs of the runs of a chunk, and their sizes, (solved, pooled, draw): a sweep with one more dimension."""
+        """Return the inputs of the runs of a chunk, and their sizes, (solved, pooled, draw)."""
         inputs = chunks.variables_within(chunk, self.inputs)
         sizes = sizes | self.pooled | {_DRAW: self.sampling.runs}
         drawn = {name: xr.Variable((_DRAW,), draws) for name, draws in self.sampling.draws.items()}
-        for name, one in self.sampling.distributions.items():
-            if name in inputs or one.kind == "absolute":
-                inputs[name] = one.applied(inputs.get(name), drawn.pop(name))
+        for name, distribution in self.sampling.distributions.items():
+            if name in inputs or distribution.kind == "absolute":
+                inputs[name] = distribution.applied(inputs.get(name), drawn.pop(name))
         for angle, name in variables.ANGLES.items():
             if angle in inputs:
                 inputs[name] = parameters.friction_coefficient(inputs.pop(angle))
-        for name in (one for one in _ESTIMATED if one in drawn):
-            # Coulomb's yield acceleration depends on no shaking, which a record has of its own
+        for name in (estimated for estimated in _ESTIMATED if estimated in drawn):
+            # Coulomb's yield acceleration does not depend on the amplitude, which a record lacks
             every = {"amplitude": xr.Variable((), 0.0), **inputs}
             request = engine.Request(self.problem, grid_inputs.grid_sizes(every), every, (name,))
             estimate = engine.friction_parameters(request, finite=False)[name]
             values = self.sampling.distributions[name].applied(estimate, drawn[name])
-            # NaN leaves it to the estimate and its flag where that fails
+            # where the estimate fails, NaN lets the kernel estimate it and raise the flag
             inputs[name] = values.where(parameters.BOUNDS[name].holds(values))
         return inputs, sizes

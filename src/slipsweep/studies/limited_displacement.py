@@ -1,7 +1,6 @@
 """The displacement that limits are set on: the permanent one, or the largest |u| over time.
 
-A block that slides both ways may come back to where it began.  What it needs room for is the
-largest |u|.
+A block that slides both ways may come back to where it began.  It needs room for the largest |u|.
 """
 
 import math
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from slipsweep.model.options import Model, changing_strength, slides_both_ways
 from slipsweep.model.variables import EXTREMES, Validity
 
-#: What results say of a block that slides both ways.
+#: Attribute `criterion` of the results of a block that slides both ways.
 LARGEST = "largest displacement over time, downslope or upslope"
 
 
@@ -40,5 +39,5 @@ def displacement_of(results: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
 
 
 def attributes_of(model: Model) -> dict[str, str]:
-    """Return the attribute that says so."""
+    """Return the attribute `criterion`, if limits are set on the largest |u|."""
     return {"criterion": LARGEST} if slides_both_ways(model) else {}

@@ -14,11 +14,11 @@ from slipsweep.grid.engine import Request
 from slipsweep.model import options, parameters, variables
 from slipsweep.model.docstrings import with_parameters
 from slipsweep.model.variables import StrengthStatus
-from slipsweep.studies import criterion, datasets
+from slipsweep.studies import datasets, limited_displacement
 from slipsweep.studies.datasets import Values
 from slipsweep.studies.limits import check_displacement
+from slipsweep.studies.required_yield import SCAN_MEMORY, yield_accelerations
 from slipsweep.studies.sampling import Floats, Sampling, check_increasing
-from slipsweep.studies.strength_roots import SCAN_MEMORY, yield_accelerations
 from slipsweep.studies.suite_statistics import QUANTILES, SUITE, THRESHOLDS
 from slipsweep.studies.uncertainty import check_drawn
 
@@ -27,7 +27,7 @@ TITLE = "Strength that is required for a tolerable displacement"
 #: Inputs that are the strength of the interface, of which one is solved for.
 _STRENGTHS = (*variables.REQUIRED_STRENGTHS, "yield_acceleration")
 
-#: A strength that every model takes, where the required one will stand.
+#: A strength that every model allows, in place of the required one.
 _ANY = 0.5
 
 #: Evaluations of the kernel for each required strength, about.
@@ -196,16 +196,16 @@ def plan_strength(
                     'be drawn, with kind = "factor" or "offset"'
                 )
         check_drawn(sampling, (*inputs, of), problem)
-        absolute = [name for name, one in drawn.items() if one.kind == "absolute"]
+        absolute = [name for name, entry in drawn.items() if entry.kind == "absolute"]
     planned = {**inputs, of: _ANY, **dict.fromkeys(absolute, _ANY)}
-    wanted = ["permanent_displacement"]
-    plan = plans.plan_sweep(planned, excitation=excitation, model=model, variables=wanted)
+    names = ["permanent_displacement"]
+    plan = plans.plan_sweep(planned, excitation=excitation, model=model, variables=names)
     dropped = {of, "mu_s", *absolute}
     if "displacement_amplitude" in plan.coords and (
         {"displacement_amplitude", "frequency"} & {*absolute}
     ):
-        dropped.add("amplitude")  # A = ω²d of no value is nobody's amplitude
-    coords = {name: one for name, one in plan.coords.items() if name not in dropped}
+        dropped.add("amplitude")  # without values of d and f there is no A = ω²d
+    coords = {name: value for name, value in plan.coords.items() if name not in dropped}
     source = plan.attrs["friction_inputs"].partition(";")[2]
     attrs = {
         **plan.attrs,
@@ -213,7 +213,7 @@ def plan_strength(
         "required": of,
         "friction_inputs": f"Üy solved for{';' if source else ''}{source}",
     }
-    attrs |= criterion.attributes_of(problem.model)
+    attrs |= limited_displacement.attributes_of(problem.model)
     if sampling is not None:
         sampling.check_draws(coords)
         attrs |= sampling.attributes
@@ -223,7 +223,7 @@ def plan_strength(
 
 
 class StrengthPlan(plans.Plan):
-    """Required strengths of a grid, each motion's along `pooled` dimensions, and quantiles."""
+    """Required strengths of a grid, with those of each motion along `pooled` dimensions."""
 
     def __init__(
         self,
@@ -236,8 +236,6 @@ class StrengthPlan(plans.Plan):
     ) -> None:
         self.of = of
         self.problem = problem
-        self.coords = coords
-        self.attrs = attrs
         self.sampling = sampling
         self.quantiles = quantiles if sampling is None else sampling.quantiles
         self.inputs = grid_inputs.inputs_of(problem, coords)
@@ -250,12 +248,9 @@ class StrengthPlan(plans.Plan):
         for dim in over:
             if dim not in sizes:
                 raise InputError(f"uncertainty.over = {parameters.shown(dim)}: is no dimension")
-        pooled = {*over, *(SUITE if "motion" in sizes else ())}
+        of_suite = {*over, *(SUITE if "motion" in sizes else ())}
         #: Dimensions that make up a suite, and the number of samples at each point.
-        self.pooled = {dim: sizes[dim] for dim in sizes if dim in pooled}
-        if self.pooled:
-            self.attrs = attrs | {"pooled": resources.grid_text(self.pooled)}
-        self.sizes = {dim: size for dim, size in sizes.items() if dim not in self.pooled}
+        self.pooled = {dim: sizes[dim] for dim in sizes if dim in of_suite}
         self.draws = 1 if sampling is None else sampling.samples
         self.runs = self.draws * math.prod(self.pooled.values())
         #: Results, and their dimensions in addition to those of the grid.
@@ -267,17 +262,21 @@ class StrengthPlan(plans.Plan):
             self.results[f"required_{of}_quantile"] = ("quantile",)
             self.results["always_within_count"] = ()
             self.results["never_within_count"] = ()
-        self.names = tuple(self.results)
-        plans.check_dimensions(sizes, coords, (*self.names, "quantile"))
-        #: How many points are solved together.
+        plans.check_dimensions(sizes, coords, (*self.results, "quantile"))
+        #: Number of points that are solved together.
         self.points = max(_TOGETHER // self.runs, 1)
-        # as of any plan
-        self.together = ()
-        self.cost = solvers.cost_of(problem) * self.runs * _EVALUATIONS
-        self.cell_memory = 0
-        self.memory = _CELL_MEMORY * max(_TOGETHER, self.runs) + solvers.memory_of(problem)
+        memory = _CELL_MEMORY * max(_TOGETHER, self.runs) + solvers.memory_of(problem)
         if options.slides_both_ways(problem.model):
-            self.memory += SCAN_MEMORY
+            memory += SCAN_MEMORY
+        super().__init__(
+            sizes={dim: size for dim, size in sizes.items() if dim not in self.pooled},
+            coords=coords,
+            tasks=(),
+            names=tuple(self.results),
+            attrs=attrs | ({"pooled": resources.grid_text(self.pooled)} if self.pooled else {}),
+            cost=solvers.cost_of(problem) * self.runs * _EVALUATIONS,
+            memory=memory,
+        )
 
     @property
     def cells(self) -> int:
@@ -301,8 +300,8 @@ class StrengthPlan(plans.Plan):
             }
             coords["quantile"] = xr.Variable("quantile", self.quantiles, about)
         results = {}
-        for name, own in self.results.items():
-            dims = (*self.sizes, *own)
+        for name, more_dims in self.results.items():
+            dims = (*self.sizes, *more_dims)
             zero = np.zeros((), variables.RESULT_DTYPES.get(name, "float64"))
             shape = [lengths[dim] for dim in dims]
             results[name] = (
@@ -387,13 +386,13 @@ def friction_of(yield_coefficient: Floats, theta: Floats, of: str) -> Floats:
 
 
 def quantiles_of(strengths: Floats, never: np.ndarray, shares: Floats) -> Floats:
-    """Return quantiles along the last axis, in which those `never` within are above all others.
+    """Return quantiles along the last axis; strengths of cells `never` within are infinite.
 
     A quantile that lies among them, or between them and the largest of the others, is infinite.
     """
-    # so large that whatever is interpolated towards it is above all others
+    # so large that a value interpolated towards it is above all others
     beyond = np.finfo(np.float64).max / 4.0
     filled = np.where(never, beyond, strengths)
-    found = np.moveaxis(np.quantile(filled, shares, axis=-1), 0, -1)
+    interpolated = np.moveaxis(np.quantile(filled, shares, axis=-1), 0, -1)
     largest = np.where(never, -np.inf, strengths).max(axis=-1)
-    return np.where(found > largest[..., np.newaxis], np.inf, found)
+    return np.where(interpolated > largest[..., np.newaxis], np.inf, interpolated)

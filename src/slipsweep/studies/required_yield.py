@@ -25,12 +25,13 @@ from slipsweep.grid.solvers import cost_of
 from slipsweep.model.options import slides_both_ways
 from slipsweep.model.variables import StrengthStatus
 from slipsweep.motion.records import Record
-from slipsweep.studies import criterion
+from slipsweep.studies import limited_displacement
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-#: Steps of the scan: of a cheap cell, of a dear one, and of each block that slides both ways.
+#: Steps of the scan: of a cell that is solved fast, of a slow one, and of each block that slides
+#: both ways.
 _FINE_STEPS = 4096
 _STEPS = 256
 _BLOCK_STEPS = 128
@@ -64,8 +65,8 @@ _PARTS = 32
 def yield_accelerations(request: Request) -> tuple[Floats, NDArray[np.int8]]:
     """Return the required Üy of a grid, m/s², and its `StrengthStatus`, with the grid's shape.
 
-    `request.inputs` has the `displacement` in place of the strength.  Üy is 0 where every one is
-    enough, and NaN where none is.
+    `request.inputs` has the `displacement` in place of the strength.  Üy is 0 where every strength
+    is enough, and NaN where none is.
     """
     dims = tuple(request.sizes)
     shape = tuple(request.sizes.values())
@@ -106,7 +107,7 @@ def _solve_part(part: Request) -> tuple[Floats, NDArray[np.int8]]:
     scan = Scan(
         part.problem,
         float(inputs["polarity"].values.item()) if "polarity" in inputs else 1.0,
-        {name: one.set_dims(sizes).values.ravel() for name, one in blocks.items()},
+        {name: variable.set_dims(sizes).values.ravel() for name, variable in blocks.items()},
     )
     targets = target.set_dims(part.sizes).values.ravel()
     block = places.set_dims(part.sizes).values.ravel()
@@ -148,8 +149,8 @@ class Bracket:
 class Scan:
     """Displacements that one motion gives its blocks, over the yield acceleration, at unit time.
 
-    `blocks` has what they differ by, by name; without it there is one block, under the motion at
-    unit strength.
+    `blocks` has the inputs by which the blocks differ.  If it is empty, there is one block, under
+    the motion at unit strength.
     """
 
     def __init__(self, problem: Problem, polarity: float, blocks: dict[str, Floats]) -> None:
@@ -181,7 +182,7 @@ class Scan:
         below = np.linspace(_LOWEST, _EQUAL_FROM, 4, endpoint=False)
         above = np.linspace(_HIGHEST, _EQUAL_TO, 4, endpoint=False)[::-1]
         self.xs = np.concatenate([below, equal, above])
-        count = max((one.size for one in blocks.values()), default=1)
+        count = max((values.size for values in blocks.values()), default=1)
         block = np.repeat(np.arange(count), self.xs.size)
         #: Displacements, (block, step).
         self.displacements = self.displacement(block, np.tile(self.xs, count)).reshape(count, -1)
@@ -195,18 +196,20 @@ class Scan:
         inputs = dict(self.motion)
         factor: Floats | float = 1.0
         for name, values in self.blocks.items():
-            one = xr.Variable("cell", values[block])
+            of_cells = xr.Variable("cell", values[block])
             if name == "factor":
-                factor = one.values
+                factor = of_cells.values
                 name = "scale" if "scale" in inputs else "amplitude"
-            inputs[name] = one
+            inputs[name] = of_cells
         peak = factor * self.peak
-        # where the base does not move a block, every yield acceleration is as good
+        # where the base does not move a block, the yield acceleration does not matter
         onset = np.where(peak > 0.0, peak, 1.0) / (1.0 + np.exp(-x))
         inputs["yield_acceleration"] = xr.Variable("cell", onset)
-        wanted = criterion.results_of(self.problem.model)
-        results = engine.solve(Request(self.problem, {"cell": x.size}, inputs, wanted))
-        return criterion.displacement_of({name: one.values for name, one in results.items()})
+        names = limited_displacement.results_of(self.problem.model)
+        results = engine.solve(Request(self.problem, {"cell": x.size}, inputs, names))
+        return limited_displacement.displacement_of(
+            {name: of_cells.values for name, of_cells in results.items()}
+        )
 
     def required(self, block: Indices, target: Floats) -> tuple[Floats, NDArray[np.int8]]:
         """Return the required r of cells (0: any, NaN: none), and their status."""
@@ -253,7 +256,8 @@ class Scan:
             slope = (bracket.high_difference - before_difference) / (high - low)
             x = before - before_difference / slope
         for evaluation in range(_MOST_EVALUATIONS):
-            # a secant that leaves the bracket, and now and then one that closes it from one side
+            # bisect where a secant leaves the bracket, and every eighth time: secants may approach
+            # from one side only
             bisects = ~((x > low) & (x < high)) | (evaluation % 8 == 7)
             x = np.where(bisects, low + 0.5 * (high - low), x)
             with np.errstate(divide="ignore"):
@@ -263,11 +267,11 @@ class Scan:
             low = np.where(above, x, low)
             high = np.where(above, high, x)
             # the rounding of r moves ln u by some of its last digits over 1 - r
-            found = np.abs(difference) <= _TOLERANCE + _ROUNDING * np.exp(x)
-            solution[cell] = np.where(found, x, high)
+            solved = np.abs(difference) <= _TOLERANCE + _ROUNDING * np.exp(x)
+            solution[cell] = np.where(solved, x, high)
             with np.errstate(divide="ignore", invalid="ignore"):
                 step = difference * (x - before) / (difference - before_difference)
-            (left,) = np.nonzero(~found & ~ended)
+            (left,) = np.nonzero(~solved & ~ended)
             if not left.size:
                 break
             before = x[left]

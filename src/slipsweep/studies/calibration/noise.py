@@ -2,7 +2,7 @@
 
 Coloured noise is taken as noise of first order (an autoregressive process): errors of samples at
 the distance Δt have the correlation ρ^(Δt/h), with ρ of neighbours and h the interval of sampling.
-Such errors are made independent by subtracting from each what its neighbour says of it.
+Such errors are made independent by subtracting from each the part that follows from the one before.
 """
 
 from collections.abc import Sequence
@@ -11,36 +11,45 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from slipsweep.studies.friction import Floats, noise_of
+from slipsweep.studies.calibration.measured_friction import Floats, noise_of
 
 #: The least noise that a channel is taken to have, in parts of its largest value: neither a spline
 #: through samples nor a sensor is better.
 LEAST_NOISE = 1e-4
 
-#: Correlations of neighbouring samples of the noise that are tried; by how much −2 ln of the
-#: likelihood falls at least if noise is coloured; variances of the noise that are tried; standard
-#: errors up to which a correlation may be chance.
+#: Standard deviation of normal noise over the median of its absolute values.
+OF_MEDIAN = 1.4826
+
+#: Correlations of neighbouring samples of the noise that are tried.
 COLOURS = (0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.93, 0.95, 0.98)
+
+#: Noise is coloured if −2 ln of the likelihood is lower by at least this than for white noise.
 NO_CHANCE = 8.0
+
+#: Variances of the noise that are tried.
 _VARIANCES = np.geomspace(0.01, 100.0, 81)
+
+#: Innovations are independent if no correlation up to this distance, in samples, is larger than so
+#: many standard errors.
+_LAGS = 10
 _CHANCE = 4.0
 
-#: Distances in samples at which residuals are looked at, and the standard deviation of normal noise
-#: over that by its median, at most.
-_LAGS = 10
+#: They are normal if their standard deviation is at most so many times that by the median.
 _TAILS = 1.25
 
-#: A flat top has so many equal values in turn at least, and so many in all.
+#: A flat top has at least so many equal values in turn, and so many in all.
 _IN_TURN = 3
 _FLAT = 4
 
-#: Steps of a converter, and standard deviations of the noise, within which a crest that is only
-#: rounded has several times as many values as are equal to the largest, and a clipped one few.
+#: Height of the band below the largest value in which a crest that is not clipped has several times
+#: as many samples as at the largest value: in steps of the converter, and in standard deviations of
+#: the noise; the larger counts.
 _STEPS = 24.0
 _NOISES = 1.5
 
-#: Noise on a flat top: standard deviations of it from the largest value to the foot of the top, and
-#: further down; how many times as many samples lie in the top as below it, and how many at least.
+#: A top is flat under noise if so many times as many samples lie within the first distance from the
+#: largest value as between it and the second (in standard deviations of the noise), and at least so
+#: many.
 _TOP = 5.0
 _BELOW = 13.0
 _CROWDED = 2.5
@@ -121,23 +130,24 @@ def _unlikeliness(rest: Floats, effects: Floats, colour: float, apart: Floats) -
 
 
 def is_first_order(innovations: Floats) -> bool:
-    """Return whether residuals less what their neighbours say of them are independent and normal.
+    """Return True if innovations are independent and normal.
 
-    Those of a motion that a model misses are not: they are smooth, or few of them are large; and
-    where white noise is added to that, they alternate.
+    Innovations are residuals less the part that follows from the residual before (`whitened`).
+    Those of a motion that the model does not have are smooth, or few of them are large; with white
+    noise in addition they alternate.
     """
     centred = innovations - innovations.mean()
     square = float(np.sum(centred**2))
     limit = _CHANCE / centred.size**0.5
     lags = range(1, min(_LAGS, centred.size // 4) + 1)
     correlations = [float(centred[lag:] @ centred[:-lag]) / square for lag in lags]
-    typical = 1.4826 * float(np.median(np.abs(centred)))
+    typical = OF_MEDIAN * float(np.median(np.abs(centred)))
     tails = (square / centred.size) ** 0.5 / max(typical, 1e-300)
     return bool(max(map(abs, correlations)) < limit and tails < _TAILS)
 
 
 def flat_top(values: Floats) -> int:
-    """Return how many samples of a clipped channel lie at its largest value; else 0.
+    """Return the number of samples at the largest value of a clipped channel; else 0.
 
     The crest of a motion is a parabola, which has five times as many samples within 25 steps of a
     converter as within one.  A clipped crest has few beside its flat top.
@@ -156,13 +166,13 @@ def flat_top(values: Floats) -> int:
 
 
 def _in_runs(holds: NDArray[np.bool_]) -> int:
-    """Return how many samples at which something holds do not stand alone or in pairs."""
+    """Return the number of samples in runs of three or more at which `holds` is True."""
     lengths = np.bincount(ndimage.label(holds)[0])[1:]
     return int(np.sum(lengths[lengths >= _IN_TURN]))
 
 
 def noisy_flat_top(values: Floats) -> int:
-    """Return how many samples of a motion lie in a flat top under noise; else 0.
+    """Return the number of samples in a flat top under noise; else 0.
 
     A parabola has about as many samples within 5 standard deviations of the noise of the largest
     value as within the next 8; a top that was cut off before the noise was added has many more.

@@ -1,4 +1,4 @@
-"""Codes of a result into labelled truth values."""
+"""`flags`: the bit mask `validity` of a result as labelled truth values."""
 
 import numpy as np
 import xarray as xr
@@ -7,14 +7,15 @@ from slipsweep.errors import InputError
 from slipsweep.model.parameters import shown
 from slipsweep.model.variables import FlagKind, Validity
 
-_KNOWN = {(flag.name or "").lower(): flag for flag in Validity}
+#: Our flags by their names in files.
+_FLAGS = {(flag.name or "").lower(): flag for flag in Validity}
 
 
 def flags(data: xr.Dataset | xr.DataArray) -> xr.Dataset:
     """Decode a bit mask: one boolean variable per flag.
 
-    Names and bits come from the attributes `flag_meanings` and `flag_masks` (CF conventions, https://cfconventions.org,
-    3.5), so that files of any version can be read.  Lazy data stay lazy.
+    Names and bits come from the attributes `flag_meanings` and `flag_masks` (CF conventions,
+    https://cfconventions.org, 3.5), so that files of any version can be read.  Lazy data stay lazy.
 
     Parameters
     ----------
@@ -57,23 +58,25 @@ def flags(data: xr.Dataset | xr.DataArray) -> xr.Dataset:
     bits = np.atleast_1d(mask.attrs.get("flag_masks", ()))
     if not names or len(names) != len(bits):
         raise InputError(
-            f"{data.name}: no bit mask, {len(bits)} flag_masks and {len(names)} flag_meanings in its attributes"
+            f"{data.name}: no bit mask, {len(bits)} flag_masks and {len(names)} flag_meanings in "
+            "its attributes"
         )
     if mask.dtype.kind not in "iu":
         raise InputError(
             f"{data.name}: {mask.dtype} values; must be whole numbers, of which none is missing "
             "(mask_and_scale=False keeps them)"
         )
-    # a flag of no kind, of another program's file, goes last
+    # flags of other programs have no kind, and go last
     order = {
-        name: list(FlagKind).index(_KNOWN[name].kind) if name in _KNOWN else len(FlagKind)
+        name: list(FlagKind).index(_FLAGS[name].kind) if name in _FLAGS else len(FlagKind)
         for name in names
     }
-    found = {}
-    for name, bit in sorted(zip(names, bits, strict=True), key=lambda one: order[one[0]]):
+    results = {}
+    for name, bit in sorted(zip(names, bits, strict=True), key=lambda pair: order[pair[0]]):
         # the bit in the type of the mask: a wider one would widen all cells with it
-        found[name] = (mask & mask.dtype.type(bit)) != 0
-        found[name].attrs = {"long_name": name.replace("_", " ")}
-        if name in _KNOWN:
-            found[name].attrs = {"long_name": _KNOWN[name].text, "kind": str(_KNOWN[name].kind)}
-    return xr.Dataset(found, coords=data.coords)
+        results[name] = (mask & mask.dtype.type(bit)) != 0
+        results[name].attrs = {"long_name": name.replace("_", " ")}
+        if name in _FLAGS:
+            flag = _FLAGS[name]
+            results[name].attrs = {"long_name": flag.text, "kind": str(flag.kind)}
+    return xr.Dataset(results, coords=data.coords)
