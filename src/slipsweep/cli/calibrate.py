@@ -182,8 +182,8 @@ def _echo_parameters(table: "xr.Dataset") -> None:
     """The parameters, their correlation, and the misfit of each channel in each test."""
     import pandas as pd
 
-    from slipsweep.motion.shaking import RESPONSES
     from slipsweep.studies.calibration.observation import SOUGHT
+    from slipsweep.studies.calibration.shaking_test import RESPONSES
 
     # no value where the data do not determine one
     rows = [
