@@ -1,4 +1,4 @@
-"""Cells that are stepped (`kernels.step`): their blocks, cycle after cycle, their results and histories."""
+"""Cells that are stepped by `kernels.step`: their cycles, results and histories."""
 
 import math
 from typing import Any
@@ -122,8 +122,8 @@ def end_cycle(block: Block) -> None:
 def repetitions(law: Law, block: Block, left: int) -> int:
     """Return how often the next cycles of that shape, at most `left`, gain what the last one did.
 
-    They do so if they begin in the same state; and also with a larger V, if friction does not depend
-    on the motion and the block does not come to rest: then V is larger throughout by as much.  A
+    They do so if they begin in the same state; and also with a larger V, if friction does not
+    depend on the motion and the block does not come to rest: then V is larger throughout by as much.  A
     block that weakens with the slip is never in the same state.
     """
     weakens = block.cycle_slip < block.weakens_until
@@ -237,7 +237,7 @@ def yield_governs_wave(law: Law, block: Block, path: Path) -> bool:
 
 @scalar
 def validity_before(block: Block, path: Path) -> int:
-    """Set friction and mode for the peak of the shaking; return the flags known before the motion."""
+    """Set friction and mode for the peak of the shaking; return the flags before the motion."""
     if not block.recorded:
         interface = set_friction(block, block.amplitude)
         if block.amplitude * path.highest > block.yield_acceleration:
