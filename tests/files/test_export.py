@@ -142,6 +142,18 @@ def test_codes_are_spelled_out_on_request(folder: Path, tmp_path: Path) -> None:
     assert ["" if pd.isna(flag) else flag for flag in worded["validity"]] == flags
 
 
+def test_several_flags_of_a_cell_are_spelled_one_after_the_other(tmp_path: Path) -> None:
+    """Just above the mode limit, of a block whose friction is estimated."""
+    text = (
+        "[axes]\ntheta.values = [5]\nmu_s.values = [0.38]\n"
+        "amplitude.values = [6.8]\nfrequency.values = [1]\n"
+    )
+    store.run(sweep_job(spec.parse(text, "x")), tmp_path / "a.nc", command="x")
+    export.export(tmp_path / "a.nc", tmp_path / "a.csv", words=True)
+    (flags,) = bare(read(tmp_path / "a.csv"))["validity"]
+    assert flags == "near_mode_limit friction_estimated"
+
+
 def test_a_parquet_file_tells_how_it_was_made(folder: Path, tmp_path: Path) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")
     export.export(folder / "cases.nc", tmp_path / "t.parquet")

@@ -317,7 +317,8 @@ def advance_by_stages(
 ) -> Step:
     """Find what a step h gains where friction depends on the motion.
 
-    Each stage of a rule goes from the start of the step to its node with the rate of the one before.
+    Each stage of a rule goes from the start of the step to its node with the rate of the stage
+    before.
     """
     rule = block.rule
     speed = block.velocity
@@ -355,7 +356,7 @@ def ground_at(block: Block, piece: Piece, curves: np.ndarray, tau: float) -> flo
 
 @scalar
 def first_rate_at(law: Law, block: Block, ground: float) -> float:
-    """Rate at the beginning of a phase; a slide that begins from rest is not stopped by rounding."""
+    """Rate at the beginning of a phase; rounding does not stop a slide that begins from rest."""
     first_rate = rate(law, block, ground, block.velocity, block.slip)
     if block.velocity == 0.0 and block.phase == UP:
         return min(first_rate, 0.0)
@@ -472,7 +473,7 @@ def may_end(law: Law, block: Block, step: Step) -> bool:
 
 @scalar
 def ending_by(block: Block, step: Step, part: float) -> int:
-    """Return how the phase has ended after a part of a step: V has passed 0, the law has weakened."""
+    """Return how the phase has ended after a part of a step: by V = 0, or as the law weakened."""
     velocity = velocity_in_step(block.velocity, step, part)
     if velocity > 0.0 if block.phase == UP else velocity < 0.0:
         return STOPS
@@ -506,7 +507,7 @@ def change_in_step(law: Law, block: Block, step: Step) -> float:
 
 @inlined
 def has_not_begun(block: Block, step: Step) -> bool:
-    """Return whether a step from rest does not get away from it: only rounding has made it slide."""
+    """Return True if a step from rest does not leave it: only rounding has made it slide."""
     stays = step.gained >= 0.0 if block.phase == UP else step.gained <= 0.0
     return block.velocity == 0.0 and stays
 
@@ -621,7 +622,7 @@ def place_beyond(
 
 @scalar
 def wait_for_yield(law: Law, block: Block, piece: Piece, curves: np.ndarray, tau: float) -> float:
-    """Return τ at which Newmark's block at rest begins to slide: where Üg exceeds what it resists."""
+    """Return τ at which Newmark's block at rest begins to slide: Üg exceeds its resistance."""
     down = resistance(law, block, 1.0, 0.0, block.slip)
     up = resistance(law, block, -1.0, 0.0, block.slip) if block.slides_up else math.inf
     block.yield_acceleration = down
@@ -743,7 +744,7 @@ def set_friction(block: Block, peak: float) -> Interface:
 
 @scalar
 def yield_governs(law: Law, block: Block, low: float, high: float) -> bool:
-    """Return whether Eq. 4 stays at or below Üy while Üg rises from low to high, but for the literal rise."""
+    """Return True if, with the monotone rise, Eq. 4 is at most Üy for Üg from low to high."""
     for j in range(POINTS_OF_RISE, -1, -1):
         ground = low + (high - low) * (j / POINTS_OF_RISE)
         if eq4_at(law, block, ground) > block.yield_acceleration:

@@ -1,6 +1,7 @@
-"""Cells that are stepped (`kernels.step`): their blocks, cycle after cycle, their results and histories."""
+"""Cells that are stepped by `kernels.step`: their cycles, results and histories."""
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -121,8 +122,8 @@ def end_cycle(block: Block) -> None:
 def repetitions(law: Law, block: Block, left: int) -> int:
     """Return how often the next cycles of that shape, at most `left`, gain what the last one did.
 
-    They do so if they begin in the same state; and also with a larger V, if friction does not depend
-    on the motion and the block does not come to rest: then V is larger throughout by as much.  A
+    They do so if they begin in the same state; and also with a larger V, if friction does not
+    depend on the motion and the block does not come to rest: then V is larger throughout by as much.  A
     block that weakens with the slip is never in the same state.
     """
     weakens = block.cycle_slip < block.weakens_until
@@ -236,7 +237,7 @@ def yield_governs_wave(law: Law, block: Block, path: Path) -> bool:
 
 @scalar
 def validity_before(block: Block, path: Path) -> int:
-    """Set friction and mode for the peak of the shaking; return the flags known before the motion."""
+    """Set friction and mode for the peak of the shaking; return the flags before the motion."""
     if not block.recorded:
         interface = set_friction(block, block.amplitude)
         if block.amplitude * path.highest > block.yield_acceleration:
@@ -435,7 +436,7 @@ def samples_of(
     at = np.searchsorted(rows["time"], phases, side="right") - 1
     # a block rests from the end of a step on, if the next one begins from rest
     goes_on = np.append(rows["velocity"][1:] != 0.0, rows["phase"][-1] == CONTINUOUS)[at]
-    row = rows[at]
+    row: Any = rows[at]
     step = row["step"]
     since = phases - row["time"]
     rests = (since > step) & ~goes_on

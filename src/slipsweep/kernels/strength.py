@@ -1,7 +1,7 @@
-"""Newmark's block whose strength changes while it slides: two laws μ(v, s), and how they are stepped.
+"""Newmark's block whose strength changes while it slides: two laws μ(v, s), and their steps.
 
-s = ∫|v|dt is the slip since the beginning.  The block is that of `kernels.step`; its acceleration is
-that of Coulomb with μ, g tan(arctan μ − θ) downslope and −g tan(arctan μ + θ) upslope.
+s = ∫|v|dt is the slip since the beginning.  The block is that of `kernels.step`; its acceleration
+is that of Coulomb with μ, g tan(arctan μ − θ) downslope and −g tan(arctan μ + θ) upslope.
 docs/numerics.md#changing-strength
 """
 
@@ -59,7 +59,9 @@ def acceleration_slope(block: Block, friction: float) -> float:
 
 @registered
 def weakening_step(block: Block, first_rate: float) -> float:
-    """Longest step while the block weakens: (25/N) √(D / |g' (μs − μr)|), g' by `acceleration_slope`.
+    """Longest step while the block weakens, (25/N) √(D / |g' (μs − μr)|).
+
+    g' is that of `acceleration_slope`.
 
     The motion is that of dV/dφ = Üg − k (W₀ − W) then, with a time of its own, 1/√k.
     """
@@ -98,7 +100,7 @@ def solve_weakening(
     log: np.ndarray,
     results: np.ndarray,
 ) -> None:
-    """Step the cells of a tile whose strength falls with slip; arguments as of `step.solve_steps`."""
+    """Step cells whose strength falls with slip; arguments as of `step_cells.solve_steps`."""
     law = Law(weakening_friction, True, True, True, weakening_step)
     solve_cells(law, cells, options, path, blocks, steps, log, results)
 
@@ -113,6 +115,6 @@ def solve_rate(
     log: np.ndarray,
     results: np.ndarray,
 ) -> None:
-    """Step the cells of a tile whose strength depends on velocity; arguments as of `step.solve_steps`."""
+    """Step cells whose strength depends on velocity; arguments as of `step_cells.solve_steps`."""
     law = Law(rate_friction, True, False, True, rate_step)
     solve_cells(law, cells, options, path, blocks, steps, log, results)
