@@ -129,7 +129,7 @@ def functions_of(path: str) -> set[str]:
 
 
 def test_theta_goes_from_sweep_to_the_formula_through_eight_files() -> None:
-    assert WALK[0] == ("studies/datasets.py", "sweep")
+    assert WALK[0] == ("studies/sweeps.py", "sweep")
     assert WALK[-1] == ("model/equations.py", "coulomb_yield_acceleration")
     assert len({path for path, _ in WALK}) <= 8
 

@@ -23,7 +23,7 @@ from slipsweep.studies.calibration.measured_friction import onset_acceleration
 from slipsweep.studies.calibration.noise import flat_top, noisy_flat_top
 from slipsweep.studies.calibration.observation import SOUGHT, Observation
 from slipsweep.studies.calibration.shaking_test import TABLE
-from slipsweep.studies.datasets import sweep
+from slipsweep.studies.sweeps import sweep
 
 #: Part of its largest acceleration from which on a table moves.
 _MOVES = 0.1
