@@ -49,14 +49,14 @@ def imported(name: str) -> Iterator[str]:
     """Modules of the package that a module imports, at its head, in a function, or for types."""
     for node in ast.walk(TREES[name]):
         if isinstance(node, ast.Import):
-            found = [alias.name for alias in node.names]
+            modules = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{name}: imports are absolute"
             full = [f"{node.module}.{alias.name}" for alias in node.names]
-            found = [one if one in NAMES else one.rpartition(".")[0] for one in full]
+            modules = [module if module in NAMES else module.rpartition(".")[0] for module in full]
         else:
             continue
-        yield from (one for one in found if one in NAMES and one != name)
+        yield from (module for module in modules if module in NAMES and module != name)
 
 
 ARROWS = {name: {*imported(name)} for name in NAMES if name not in FACE}
