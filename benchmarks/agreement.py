@@ -102,13 +102,14 @@ def main() -> None:
     )
     print(by_kind, by_regime, sep="\n")
     head = (
-        f"{cells:,} cells, {modes[0]:,} of them stuck, {modes[1]:,} in stick–slip, {modes[2]:,} in continuous sliding, "
-        f"{modes[-1]:,} without a value. {measured_on(('numpy', 'numba'))} Written by `python -m benchmarks.agreement"
-        f" --cells {cells} --seed {seed}`."
+        f"{cells:,} cells, {modes[0]:,} of them stuck, {modes[1]:,} in stick–slip, "
+        f"{modes[2]:,} in continuous sliding, {modes[-1]:,} without a value. "
+        f"{measured_on(('numpy', 'numba'))} "
+        f"Written by `python -m benchmarks.agreement --cells {cells} --seed {seed}`."
     )
     batches = (
-        f"{PLAIN * len(in_batches):,} cells under a sine, solved in batches and from event to event, differ by "
-        f"{number(max(in_batches), 2)} of their bound at most."
+        f"{PLAIN * len(in_batches):,} cells under a sine, solved in batches and from event to "
+        f"event, differ by {number(max(in_batches), 2)} of their bound at most."
     )
     page = f"{head}\n\n{by_kind}\n{by_regime}\n{batches}\n"
     (given.folder / "agreement.md").write_text(page, encoding="utf-8")

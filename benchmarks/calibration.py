@@ -82,7 +82,7 @@ def sensed(test: xr.Dataset, noise: str, seed: int) -> xr.Dataset:
 
 
 def one(task: tuple[str, str, int]) -> list[tuple[bool, bool]]:
-    """Of each parameter, whether the interval holds the true value, and whether it is bounded."""
+    """For each parameter, two bools: the interval holds the true value; it is bounded."""
     kind, noise, seed = task
     case, test = drawn(kind, seed)
     found = slipsweep.calibrate(
@@ -101,17 +101,18 @@ def report(results: dict[tuple[str, str], np.ndarray]) -> str:
     for (kind, noise), found in results.items():
         held, bounded = found.mean(axis=0).T
         shares = [
-            f"{100 * share:.1f} % ({100 * known:.0f} %)"
-            for share, known in zip(held, bounded, strict=True)
+            f"{100 * held_share:.1f} % ({100 * bounded_share:.0f} %)"
+            for held_share, bounded_share in zip(held, bounded, strict=True)
         ]
         rows.append([KINDS[kind], noise, len(found), *shares])
     return (
         f"{measured_on(('numpy', 'scipy', 'numba'), timed=False)}\n\n"
-        "Share of tests whose 95 % interval holds the true value; in brackets the share whose interval has both "
-        "ends. *White*: noise of 1 % of each channel's peak, the table's among them. *12 bits*: a converter of 12 "
-        f"bits and no other noise. {CYCLES} cycles, {RATE} samples a second, all four channels; θ 0 to 14°, μs 0.2 "
-        "to 0.6, λ 0.5 to 6, Δμ up to 0.4 μs, A 1.5 to 9 m/s², A/Üy 1.2 to 5, 1 to 4 Hz. By `python -m "
-        f"benchmarks.calibration --repetitions {rows[0][2]}`.\n\n"
+        "Share of tests whose 95 % interval holds the true value; in brackets the share whose "
+        "interval has both ends. *White*: noise of 1 % of each channel's peak, the table's among "
+        "them. *12 bits*: a converter of 12 bits and no other noise. "
+        f"{CYCLES} cycles, {RATE} samples a second, all four channels; θ 0 to 14°, μs 0.2 to 0.6, "
+        "λ 0.5 to 6, Δμ up to 0.4 μs, A 1.5 to 9 m/s², A/Üy 1.2 to 5, 1 to 4 Hz. "
+        f"By `python -m benchmarks.calibration --repetitions {rows[0][2]}`.\n\n"
         + table(["tests", "noise", "number", "Üy", "λ", "Δμ"], rows)
     )
 

@@ -1,4 +1,4 @@
-"""Programs that solve differential equations, and pySLAMMER, on cells of `benchmarks.sample`: for speed_vs_error.
+"""Programs that solve differential equations, and pySLAMMER, on cells of `benchmarks.sample`.
 
 One cycle of a sine: Newmark's block, and the paper's law in stick–slip.  General solvers are given
 the rate of the relative velocity, the phases at which it has a kink, and the event that the block
@@ -25,8 +25,7 @@ END = 40.0 * np.pi
 
 
 def rate_by(xp: Any) -> Callable[[Any, Any], Any]:
-    """dV/dφ of a block that slides, in units of A, as a function of the phase and a cell, by NumPy or jax.numpy.
-
+    """dV/dφ of a sliding block, in units of A, of the phase and a cell, by NumPy or jax.numpy.
     b = max(Üy, Eq. 4) up to the peak of Üg, held beyond it; Eq. 12 from Üg = 0 on.  Newmark's block
     has b = Üy.
     """
@@ -59,7 +58,7 @@ def cells_of(group: Group) -> Any:
 
 
 def begin_at_yield(group: Group) -> Group:
-    """The cells whose slide begins at Üy: under a few others, Eq. 4 lets the block stick for longer."""
+    """Cells whose slide begins at Üy: in a few others, Eq. 4 lets the block stick for longer."""
     cells = cells_of(group)
     rates = [rate_by(np)(np.arcsin(cell[1] / cell[0]) + 1e-6, cell) for cell in cells]
     return group.take(np.flatnonzero(np.array(rates) > 0.0))
@@ -192,7 +191,7 @@ def _unscaled(group: Group, found: Any) -> Any:
 
 @dataclass(frozen=True)
 class Program:
-    """A function of a group and a setting, its settings and regimes, the cells it is given, its marker and colour."""
+    """Function of a group and a setting, its settings, regimes and cells, its marker and colour."""
 
     solve: Callable[[Group, Any], Any]
     marker: str

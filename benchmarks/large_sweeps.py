@@ -1,5 +1,6 @@
-"""Large sweeps to disk: ``python -m benchmarks.large_sweeps`` writes results/large_sweeps.md; minutes, 8 GB.
+"""Large sweeps to disk: ``python -m benchmarks.large_sweeps`` writes large_sweeps.md.
 
+It takes minutes and 8 GB.
 `slipsweep run` of 10⁸ cells, beside what netCDF4 and xarray need to write the same arrays, and the
 memory that a run takes at its peak.  ``--larger 10`` adds 10⁹ cells in netCDF, once: 20 GB of disk.
 """
@@ -49,7 +50,7 @@ def sweep_file(path: Path, lengths: Sequence[int]) -> Path:
 
 
 def seconds_and_memory(*command: str) -> tuple[float, float]:
-    """Seconds of a process, with what it has written on the disk itself, and its resident memory at the peak, MB."""
+    """Seconds of a process until its output is on the disk, and its peak resident memory, MB."""
     started = time.perf_counter()
     process = subprocess.Popen([sys.executable, *command])
     _, status, usage = os.wait4(process.pid, 0)
@@ -89,7 +90,7 @@ def write_xarray(path: Path, lengths: Sequence[int]) -> float:
 def measured(
     folder: Path, lengths: Sequence[int], turns: int, outputs: dict[str, tuple[str, ...]]
 ) -> str:
-    """The table of a sweep of these lengths, written by `slipsweep run` to each of `outputs`, and by the others."""
+    """Table of a sweep of these lengths, written by `slipsweep run`, netCDF4 and xarray."""
     seconds: dict[str, list[float]] = {}
     memory: dict[str, float] = {}
     sweep = sweep_file(folder / "a.toml", lengths)

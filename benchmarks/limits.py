@@ -112,8 +112,7 @@ KINDS = {
 
 
 def ratios(group: Group, amplitudes: int) -> Iterator[float]:
-    """Each limit over that of the dense scan; NaN where neither has one, infinite or 0 where one has none.
-
+    """Each limit over that of the dense scan; NaN if neither has one, ∞ or 0 if one has none.
     Raises
     ------
     RuntimeError
@@ -201,9 +200,10 @@ def main() -> None:
         )
         print(*rows[-1], sep=", ", flush=True)
     (given.folder / "limits.md").write_text(
-        f"{table(HEADER, rows)}\n{blocks:,} blocks of each kind, most with a limit, against {amplitudes:,} amplitudes; "
-        f"the worst ratio is that of a higher limit. {measured_on(('numpy', 'numba'))} Written by "
-        f"`python -m benchmarks.limits --blocks {blocks} --seed {seed}`.\n",
+        f"{table(HEADER, rows)}\n"
+        f"{blocks:,} blocks of each kind, most with a limit, against {amplitudes:,} amplitudes; "
+        f"the worst ratio is that of a higher limit. {measured_on(('numpy', 'numba'))} "
+        f"Written by `python -m benchmarks.limits --blocks {blocks} --seed {seed}`.\n",
         encoding="utf-8",
     )
 

@@ -21,12 +21,12 @@ import slipsweep
 from benchmarks.machine import arguments, cores, table
 from slipsweep.motion.shaking import CHANNELS
 
-#: Friction coefficient that the blocks have at rest where it falls, and at speed where it rises: that
-#: of the paper's interface.
+#: Friction coefficient that the blocks have at rest where it falls, and at speed where it rises:
+#: that of the paper's interface.
 MU = 0.38
 
-#: Published sizes of friction that depends on velocity, of sliding bearings: how much it changes (0.093
-#: and 0.113; half of it), and a in s/m.  They rise; those that fall have the same size.
+#: Published sizes of friction that depends on velocity, of sliding bearings: its change (0.093 and
+#: 0.113; half of it), and a in s/m.  They rise; those that fall have the same size.
 RATE_LAWS = {
     "Constantinou and others 1990": (0.0927, 23.6),
     "OpenSees, VelDependent": (0.113, 24.2),
@@ -136,7 +136,7 @@ def fitted_friction(block: Block) -> float:
 
 
 def predicted(job: tuple[int, Block]) -> list[dict[str, Any]]:
-    """Return predictions and the true displacement at all shakings of a block but that of its test."""
+    """Return predictions and the true displacement at all shakings but that of the test."""
     seed, block = job
     test, kinetic = test_of(block, seed)
     found = slipsweep.calibrate(test, block.theta, block.friction["mu_s"], cycles=False)
@@ -235,12 +235,12 @@ def main() -> None:
     ]
     slides = [row for row in rows if row["truth"] >= LEAST]
     heading = ["friction", "predicted by", "shakings", "median", "5 to 95 %", "within a factor 2"]
-    about = (
-        f"Predicted over true permanent displacement of {len(jobs)} blocks, {len(slides)} shakings of "
-        f"{CYCLES} cycles of a sine in which the block moves by 1 mm or more; one of no value counts as 0. "
-        "Written by `python -m benchmarks.linearisation`."
+    legend = (
+        f"Predicted over true permanent displacement of {len(jobs)} blocks, {len(slides)} shakings "
+        f"of {CYCLES} cycles of a sine in which the block moves by 1 mm or more; one of no value "
+        "counts as 0. Written by `python -m benchmarks.linearisation`."
     )
-    text = f"{table(heading, lines)}\n{about}\n"
+    text = f"{table(heading, lines)}\n{legend}\n"
     (given.folder / "linearisation.md").write_text(text, encoding="utf-8")
     draw(kinds).savefig(given.folder / "linearisation.png", dpi=120)
 

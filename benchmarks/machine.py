@@ -47,13 +47,16 @@ def versions(packages: Iterable[str]) -> str:
 
 
 def measured_on(packages: Iterable[str] = ("numpy", "numba", "xarray"), timed: bool = True) -> str:
-    """The sentence that stands over every table; over times it says so if other processes had the cores, too."""
+    """Machine and versions, over every table; with times also the load of other processes."""
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     is_busy = timed and load > 2 * cores()
     busy = (
         f" Other processes used the machine (load {load:.0f}): times are rough." if is_busy else ""
     )
-    return f"Measured on {processor()}; {platform.system()}, {versions(packages)}, slipsweep {__version__}.{busy}"
+    return (
+        f"Measured on {processor()}; {platform.system()}, {versions(packages)}, "
+        f"slipsweep {__version__}.{busy}"
+    )
 
 
 def alternate(
@@ -103,7 +106,7 @@ def arguments(
     counts: Mapping[str, int] | None = None,
     files: Iterable[str] = (),
 ) -> argparse.Namespace:
-    """The command line that all measurements share, and whole numbers with their defaults and files of its own."""
+    """Command line that all measurements share, with further whole numbers and files."""
     parser = argparse.ArgumentParser(description=(description or "").split("\n")[0])
     parser.add_argument("--tiny", action="store_true", help="a few cells only, to see that it runs")
     parser.add_argument(

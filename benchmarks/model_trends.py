@@ -68,7 +68,9 @@ def experiments() -> str:
         row: list[object] = [text]
         for which, cell in enumerate((STICK_SLIP, CONTINUOUS)):
             inputs = cell | {name: values[which] for name, values in given.items()}
-            found = slipsweep.sweep(**inputs, excitation=slipsweep.Sine(cycles=CYCLES), model=model)  # type: ignore[arg-type]
+            shaking = slipsweep.Sine(cycles=CYCLES)
+            options: Any = inputs | {"excitation": shaking, "model": model}
+            found = slipsweep.sweep(**options)
             about = []
             if (
                 model != "newmark"
@@ -86,7 +88,7 @@ def experiments() -> str:
 
 
 def sensitivity() -> str:
-    """Change of the permanent displacement of both experiments when one input is a tenth larger or smaller."""
+    """Change of both experiments' permanent displacement as an input grows or falls by a tenth."""
     shaking = slipsweep.Sine(cycles=CYCLES)
     rows: list[list[object]] = []
     names = {"yield_acceleration": "Üy", "decay_rate": "λ", "delta_mu": "Δμ"}
@@ -98,7 +100,8 @@ def sensitivity() -> str:
     ]
 
     def displacement(cell: dict[str, float]) -> float:
-        return float(slipsweep.sweep(**cell, excitation=shaking).permanent_displacement)  # type: ignore[arg-type]
+        result = slipsweep.sweep(**cell, excitation=shaking)  # type: ignore[arg-type]
+        return float(result.permanent_displacement)
 
     for name, symbol in names.items():
         row: list[object] = [symbol]
@@ -115,7 +118,7 @@ def sensitivity() -> str:
 def against(
     found: xr.Dataset, axis: str
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
-    """Steps of the grid along an axis: with a displacement at both ends, against what is expected, with a caution."""
+    """Steps along an axis: those between displacements, against the trend, and under a caution."""
     low = found.isel({axis: slice(None, -1)})
     high = found.isel({axis: slice(1, None)})
     before = low.permanent_displacement.values
@@ -167,8 +170,9 @@ def main() -> None:
     given = arguments(__doc__)
     by = "Written by `python -m benchmarks.model_trends`.\n"
     (given.folder / "experiments.md").write_text(
-        f"{experiments()}\nA sine of the printed amplitude, {CYCLES} cycles. Üy is the yield acceleration, at which "
-        f"sliding begins; λ and Δμ describe how friction decays with stronger shaking. {by}",
+        f"{experiments()}\nA sine of the printed amplitude, {CYCLES} cycles. "
+        "Üy is the yield acceleration, at which sliding begins; λ and Δμ describe how friction "
+        f"decays with stronger shaking. {by}",
         encoding="utf-8",
     )
     (given.folder / "sensitivity.md").write_text(
@@ -177,8 +181,8 @@ def main() -> None:
     )
     cells = " × ".join(str(values.size) for values in SLOPE.values())
     (given.folder / "model_trends.md").write_text(
-        f"{trends(given.tiny)}\nθ 8 to 14°, μs 0.25 to 0.45, PGA 0.05 to 1.2 g, 1 Hz, 15 cycles, {cells} cells; "
-        f"shares of the steps from one point of the grid to the next. {by}",
+        f"{trends(given.tiny)}\nθ 8 to 14°, μs 0.25 to 0.45, PGA 0.05 to 1.2 g, 1 Hz, 15 cycles, "
+        f"{cells} cells; shares of the steps from one point of the grid to the next. {by}",
         encoding="utf-8",
     )
 

@@ -67,7 +67,7 @@ def exact_displacement(motion: Any, g: float, ky: float = KY, factor: float = 1.
 
 
 def pynewmark_displacement(motion: Any, parts: int, g: float) -> float:
-    """pyNewmarkDisp's direct_newmark on a refined motion, m: accelerations in g, of which it makes 9.81 m/s²."""
+    """direct_newmark of pyNewmarkDisp on a refined motion, m; it takes g for 9.81 m/s²."""
     from pynewmarkdisp.newmark import direct_newmark
 
     values = refined(motion.accel, parts)
@@ -106,7 +106,10 @@ def slammer_runs(path: Path, found: dict[str, Any]) -> list[Run]:
 
 
 def comparison(found: dict[str, Any], runs: list[Run], g: float) -> str:
-    """Another program's displacements over slipsweep's: slope, R², share within the tolerance; the worst, refined."""
+    """Another program's displacements over slipsweep's: slope, R², share within the tolerance.
+
+    The worst are refined.
+    """
     ours = np.array(
         [exact_displacement(found[name], g, ky, factor) for name, ky, factor, _ in runs]
     )
@@ -136,8 +139,8 @@ def comparison(found: dict[str, Any], runs: list[Run], g: float) -> str:
     ]
     return (
         f"{len(runs)} analyses: slope {(ours @ theirs) / (ours @ ours):.4f}, "
-        f"R² {np.corrcoef(ours, theirs)[0, 1] ** 2:.6f}, {within:.0%} within pySLAMMER's tolerance ({PART:.0%}; "
-        f"{1000 * METRES:g} mm below {1000 * SMALL:g} mm).\n\n{table(header, rows)}"
+        f"R² {np.corrcoef(ours, theirs)[0, 1] ** 2:.6f}, {within:.0%} within pySLAMMER's tolerance "
+        f"({PART:.0%}; {1000 * METRES:g} mm below {1000 * SMALL:g} mm).\n\n{table(header, rows)}"
     )
 
 
@@ -168,16 +171,17 @@ def main(given: argparse.Namespace) -> Path:
         f"{measured_on(('numpy', 'numba', 'pyslammer', 'pynewmarkdisp'))} "
         "Made by `python -m benchmarks.records --slammer SLAMMER_results.xlsx`.\n\n"
         f"## Agreement, ky = {KY} g\n\n"
-        "slipsweep is exact for the straight lines between samples. The others' columns are their relative\n"
-        "difference from it. pySLAMMER sees onset and stop at samples only: refined, it converges to the exact\n"
-        "answer. It does not run a block out that still slides as the record ends. pyNewmarkDisp has another rule:\n"
-        "while Üg is below yield, its block loses the velocity |∫ Üg dt| instead of ∫ (Üy − Üg) dt, and is hardly\n"
-        "braked near Üg = 0; no refinement removes that.\n\n"
+        "slipsweep is exact for the straight lines between samples. The others' columns are their\n"
+        "relative difference from it. pySLAMMER sees onset and stop at samples only: refined, it\n"
+        "converges to the exact answer. It does not run a block out that still slides as the\n"
+        "record ends. pyNewmarkDisp has another rule: while Üg is below yield, its block loses\n"
+        "the velocity |∫ Üg dt| instead of ∫ (Üy − Üg) dt, and is hardly braked near Üg = 0; no\n"
+        "refinement removes that.\n\n"
         f"{agree}\n"
         "## SLAMMER and pySLAMMER against slipsweep\n\n"
-        "Both take the motions as they are sampled; where they differ most, pySLAMMER comes near as samples are "
-        "refined.\nSLAMMER 1.1: its own results, which pySLAMMER is verified against; the motions scaled, and both "
-        "ways.\n\n"
+        "Both take the motions as they are sampled; where they differ most, pySLAMMER comes near\n"
+        "as samples are refined. SLAMMER 1.1: its own results, which pySLAMMER is verified\n"
+        "against; the motions scaled, and both ways.\n\n"
         f"{compared}"
     )
     return Path(page)

@@ -1,4 +1,4 @@
-"""What an error costs, by both solvers and by other programs: ``python -m benchmarks.speed_vs_error``.
+"""Time against error of both solvers and other programs: ``python -m benchmarks.speed_vs_error``.
 
 Writes speed_vs_error.csv and .png, and engines.md.  Cells are those of `benchmarks.sample`, one
 cycle each, over and over up to as many as fill batches and hide a call; those programs of
@@ -43,7 +43,7 @@ WANTED = (1e-3, 1e-6, 1e-9, 1e-12)
 
 @dataclass(frozen=True)
 class Point:
-    """A solver (cycle, a rule of the step solver, another program) with its steps or tolerance on one regime."""
+    """Solver (cycle, a rule of steps, another program) with its steps or tolerance on a regime."""
 
     solver: str
     setting: float
@@ -73,7 +73,7 @@ def measure(
     by: Any,
     cells: int,
 ) -> Point:
-    """A point from all groups of a regime, each repeated up to some cells and solved with the option `by`."""
+    """Point from all groups of a regime, each repeated up to `cells`, solved with option `by`."""
     seconds = 0.0
     errors = []
     for group in groups:
@@ -125,7 +125,7 @@ def write_csv(found: list[Point], path: Path) -> None:
 def coarsest(
     found: list[Point], regimes: Sequence[str], solvers: Sequence[str], errors: Sequence[float]
 ) -> str:
-    """A table of the coarsest settings with which 95 of 100 cells are within an error, and of their times."""
+    """Table of the coarsest settings with 95 of 100 cells within an error, and of their times."""
     rows = []
     for regime, solver in itertools.product(regimes, solvers):
         own = [point for point in found if (point.solver, point.regime) == (solver, regime)]
@@ -176,7 +176,8 @@ def draw(found: list[Point], path: Path) -> None:
     figure.supxlabel("processor time a cell, s")
     figure.supylabel("relative error of the displacement")
     figure.suptitle(
-        "What an error costs (median, whisker to the 95th percentile): down and to the left is better"
+        "What an error costs (median, whisker to the 95th percentile): "
+        "down and to the left is better"
     )
     figure.savefig(path, dpi=150)
 
@@ -188,8 +189,9 @@ def main() -> None:
     write_csv(found, given.folder / "speed_vs_error.csv")
     (given.folder / "engines.md").write_text(
         f"{coarsest(found, COMPARED, [*COLOURS], WANTED)}\n"
-        "Processor time a cell, µs, and in brackets the steps a cycle or the tolerance, of the fastest "
-        "setting with which 95 of 100 cells are within the relative error; “–”: none of those tried. "
+        "Processor time a cell, µs, and in brackets the steps a cycle or the tolerance, of the "
+        "fastest setting with which 95 of 100 cells are within the relative error; “–”: none of "
+        "those tried. "
         f"{measured_on(('numpy', 'numba', *engines.PROGRAMS))} "
         "Written by `python -m benchmarks.speed_vs_error`.\n",
         encoding="utf-8",

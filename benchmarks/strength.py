@@ -1,4 +1,4 @@
-"""Error of the default steps where the strength changes while the block slides: ``python -m benchmarks.strength``.
+"""Error of the default steps if the strength changes in a slide: ``python -m benchmarks.strength``.
 
 Random cells by the default steps, against steps eight times as fine, which
 tests/kernels/test_changing_strength.py holds to SciPy's integrator.  Writes strength.md.

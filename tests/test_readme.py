@@ -21,6 +21,7 @@ import slipsweep
 from slipsweep.files import spec
 from slipsweep.model.choices import declared
 from slipsweep.model.options import MODELS, SOLVERS
+from slipsweep.model.parameter_table import PARAMETER_TABLE
 from slipsweep.model.variables import DIMENSION_ORDER, Validity
 from slipsweep.motion.reading import Reading
 from slipsweep.motion.waveforms import WAVEFORMS
@@ -46,7 +47,7 @@ NOT_RUN = (
 
 
 class Block(NamedTuple):
-    """A fenced block: its language, the line it begins in, its text, and the file that the reader saves it as."""
+    """A fenced block: language, first line, text, and the file that the reader saves it as."""
 
     language: str
     line: int
@@ -119,7 +120,7 @@ def output_of(arguments: list[str], folder: Path) -> str:
 
 
 def printed_by(text: str, where: str, folder: Path) -> str:
-    """What a reader's program prints, run in this process, which has imported everything already."""
+    """Output of a reader's program, run in this process, which has imported everything already."""
     assert "slipsweep." not in text or "import slipsweep" in text, where
     output = io.StringIO()
     errors = io.StringIO()
@@ -302,7 +303,7 @@ def test_comparison_with_the_paper() -> None:
 
 
 def test_numbers_of_the_paper_sweep() -> None:
-    """340 mm and 0.299 m/s, 162 mm and 0.227 m/s: with the rounded friction above static of Table 2."""
+    """340 mm and 0.299 m/s, 162 mm and 0.227 m/s: with the rounded friction of Table 2."""
     text = " ".join(section("docs/tutorial.md", "## Against the paper").split())
     for experiment, frequency, decay_rate, delta_mu in (
         (STICK_SLIP, 1.8, 2.70, 0.09),
@@ -370,6 +371,17 @@ def test_keys_are_those_of_the_schema(heading: str) -> None:
             assert stated == "–", name
         elif default is not None:
             assert stated.replace('"', "'") == repr(default), name
+
+
+def test_units_and_bounds_of_parameters_are_those_of_the_program() -> None:
+    """A document with other numbers would promise values that are then refused."""
+    table = rows(section("docs/sweep-files.md", "## `[axes.NAME]`"))
+    stated = {row[0].strip("`"): (row[1].strip("`"), row[2]) for row in table if row[1] != "type"}
+    for row in PARAMETER_TABLE:
+        if row.name != "polarity":  # a key of [excitation]
+            unit, allowed = stated[row.name]
+            assert unit == row.units, row.name
+            assert allowed == row.bound.brief, row.name
 
 
 def test_published_equations_are_those_of_the_program() -> None:

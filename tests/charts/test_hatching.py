@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 import slipsweep
-from slipsweep.charts import maps, style
+from slipsweep.charts import style
 from slipsweep.charts.slices import Result
 from slipsweep.model.variables import NOTES
 from slipsweep.studies.cautions import unsound_texts
@@ -47,11 +47,6 @@ def test_hatching_is_where_validity_says_so(grid: xr.Dataset, x: str) -> None:
         assert all(patch.hatches[0] for patch in patches)
         seen += covered.sum()
     assert seen > 0
-
-
-def test_all_flags_but_notes_have_a_hatch_of_their_own() -> None:
-    assert slipsweep.Validity(sum(maps.HATCHES)) == ~NOTES
-    assert len({*maps.HATCHES.values(), maps.UNSOUND_HATCH}) == len(maps.HATCHES) + 1
 
 
 def test_what_no_block_does_is_marked_and_its_share_told(lined: xr.Dataset) -> None:

@@ -1,4 +1,4 @@
-"""The command line: exit status, messages, files; as a process of its own where that is what counts."""
+"""The command line: exit status, messages, files; as a process where that counts."""
 
 import contextlib
 import csv
@@ -264,7 +264,8 @@ def missing(uid):
     raise KeyError(uid)
 pwd.getpwuid = missing
 from slipsweep.cli import main
-sys.exit(main(["run", "small.toml"]) or main(["chart", "small.nc", "-k", "contours", "-o", "a.png"]))
+chart = ["chart", "small.nc", "-k", "contours", "-o", "a.png"]
+sys.exit(main(["run", "small.toml"]) or main(chart))
 """
 
 

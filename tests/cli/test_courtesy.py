@@ -1,4 +1,4 @@
-"""Units as people type them, names as commands can write them, and a reason where there is no number."""
+"""Units as people type them, names that commands can write, and a reason for each missing value."""
 
 import importlib
 import math
@@ -15,7 +15,13 @@ from slipsweep.files.opening import read_result
 from tests.support.commands import run_command
 
 BLOCK = ("simulate", "--theta", "5", "--mu-s", "0.38", "--frequency", "2")
-SWEEP = "[axes]\ntheta.values = [5]\nmu_s.values = [0.4]\namplitude.values = [4]\nfrequency.values = [2]\n"
+SWEEP = """
+[axes]
+theta.values = [5]
+mu_s.values = [0.4]
+amplitude.values = [4]
+frequency.values = [2]
+"""
 
 
 def told(*arguments: object, status: int = 0) -> str:
@@ -110,7 +116,7 @@ def test_simulate_without_a_value_says_why_and_fails(
 def test_messages_give_reasons_and_remedies(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """An angle taken for a coefficient, values that a record lacks, an axis that is not there, and unsound places."""
+    """An angle as a coefficient, values that a record lacks, a missing axis, unsound cells."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a.toml").write_text(SWEEP.replace("0.4", "22"))
     assert "no cell has a value: 1 - tan(theta) (mu_s - tan(theta)) <= 0" in (

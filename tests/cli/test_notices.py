@@ -74,7 +74,7 @@ def test_a_solver_that_is_typed_keeps_the_options_of_the_sweep_file(
 def test_amplitudes_that_may_be_meant_in_g_are_asked_about(
     tmp_path: Path, amplitudes: list[float], hint: bool
 ) -> None:
-    """Where no cell slides: the largest amplitude and the smallest yield acceleration, in both units."""
+    """If no cell slides: the largest amplitude and the smallest Üy, in both units."""
     text = SWEEP.replace("theta.values = [5]", "theta.values = [0]").replace(
         "[2, 4]", str(amplitudes)
     )

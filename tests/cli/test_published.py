@@ -36,7 +36,9 @@ def test_info_prints_equations_beside_the_suite(folder: Path) -> None:
     assert (done.returncode, done.stderr) == (0, "")
     lines = done.stdout.splitlines()
     start = lines.index("published equations beside:")
-    title, suite, jibson = lines[start + 1], lines[start + 4], lines[start + 5]
+    title = lines[start + 1]
+    suite = lines[start + 4]
+    jibson = lines[start + 5]
     assert title.split() == [
         *("PGA", "(g)", "displacement", "of", "16", "%", "(mm)", "median", "(mm)", "84", "%"),
         *("(mm)", "zero", "P(u", ">", "50", "mm)", "range"),

@@ -1,4 +1,4 @@
-"""Tables and summaries that commands print: every column has the numbers of Python's functions, in its unit."""
+"""Tables and summaries that commands print have the numbers of Python's functions, in units."""
 
 import re
 from pathlib import Path
@@ -194,7 +194,7 @@ def test_info_has_every_measure_of_every_motion(folder: Path) -> None:
 
 
 def test_statistics_of_a_suite_have_a_line_for_each_grid_point(folder: Path) -> None:
-    """Median, 16 and 84 % in mm, the share of zeros, and P(u > d) of the displacements asked for."""
+    """Median, 16 and 84 % in mm, the share of zeros, and P(u > d) of each displacement."""
     text = printed(folder, "info", "suite.nc", "-d", "1mm", "-d", "2cm")
     heading, rows = table(text, "PGA (g)   ky", 8)
     titles = "PGA (g) ky 16 % median 84 % zero P(u > 1 mm) P(u > 20 mm)"

@@ -196,8 +196,9 @@ def test_what_cannot_be_exported(folder: Path, tmp_path: Path) -> None:
         (("none.nc", "t.csv"), {}, "none.nc: no such file"),
         ((str(tmp_path / "other.nc"), "t.csv"), {}, "not a netCDF file"),
     ):
+        source, output = arguments
         with pytest.raises(InputError, match=message):
-            export.export(folder / arguments[0], tmp_path / arguments[1], **options)  # type: ignore[arg-type]
+            export.export(folder / source, tmp_path / output, **options)  # type: ignore[arg-type]
     assert [entry.name for entry in tmp_path.iterdir()] == ["other.nc"]
 
 
@@ -322,7 +323,8 @@ def test_a_pivoted_table_of_a_result_has_the_axes_of_that_result(
         ),
         (
             ("--columns", "mu_s", "--rows", "theta", "--at", "frequency=2"),
-            "neither in --rows nor in --columns: displacement_amplitude (3 values), decay_rate (2 values)",
+            "neither in --rows nor in --columns: displacement_amplitude (3 values), decay_rate "
+            "(2 values)",
         ),
     ],
 )
@@ -344,7 +346,7 @@ def test_a_case_is_cut_by_its_label(folder: Path, tmp_path: Path) -> None:
 
 
 def test_a_spreadsheet_says_what_it_is_of(folder: Path, tmp_path: Path) -> None:
-    """Read by another program: a sheet for each result, and one of inputs, estimates, flags and provenance."""
+    """Another program reads a sheet for each result, and those of inputs, flags and provenance."""
     path = tmp_path / "t.xlsx"
     export.export(
         folder / "cases.nc", path, columns="frequency", at={"case": "steep,1"}, words=True
@@ -421,7 +423,8 @@ def test_accelerations_in_g(folder: Path, tmp_path: Path) -> None:
         (
             1200,
             {},
-            "the table has 1440000 rows (1200 theta x 1200 mu_s) and 3 columns, a sheet of .xlsx 1048576",
+            "the table has 1440000 rows (1200 theta x 1200 mu_s) and 3 columns, a sheet of .xlsx "
+            "1048576",
         ),
         (524288, {}, "the table has 1048576 rows"),
         (

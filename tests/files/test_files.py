@@ -1,4 +1,4 @@
-"""Files opened by the programs of others: CF checker, ncdump, NCO, CDO and GNU Octave read what was written."""
+"""Result files in the programs of others: CF checker, ncdump, NCO, CDO and GNU Octave."""
 
 import os
 import re
@@ -23,7 +23,13 @@ amplitude.values = [1, 4, 8]
 frequency.values = [1, 2]
 structure_frequency.values = [0.5, 4]
 [output]
-variables = ["permanent_displacement", "peak_relative_velocity", "sliding_mode", "validity", "acceleration_ratio"]
+variables = [
+    "permanent_displacement",
+    "peak_relative_velocity",
+    "sliding_mode",
+    "validity",
+    "acceleration_ratio",
+]
 """
 
 CASES = """
@@ -213,7 +219,7 @@ def listed(text: str, name: str) -> list[str]:
 
 
 def same(words: list[str], stored: np.ndarray, missing: str = "", fills: bool = False) -> None:
-    """Compare printed values with those stored; `missing` is what a program prints for a fill value, if it `fills`."""
+    """Compare printed values with those stored; `missing` is printed for a fill value."""
     read = np.array([float(word) if word != missing else np.nan for word in words]).astype(
         stored.dtype
         if stored.dtype.kind == "f"

@@ -1,4 +1,4 @@
-"""`sweep` and its siblings as functions: what goes in, what comes out, what is refused, what it costs."""
+"""`sweep` and its siblings as functions: arguments, results, refusals and costs."""
 
 import math
 import os
@@ -601,8 +601,8 @@ print((peak() - before) / result.nbytes)
 """
 
 AXES_OF = (
-    "np.linspace(0, 20, sizes[0]), np.linspace(0.2, 0.9, sizes[1]), np.linspace(0.5, 13, sizes[2]), "
-    "np.linspace(0.1, 20, sizes[3])"
+    "np.linspace(0, 20, sizes[0]), np.linspace(0.2, 0.9, sizes[1]), "
+    "np.linspace(0.5, 13, sizes[2]), np.linspace(0.1, 20, sizes[3])"
 )
 
 
@@ -613,7 +613,8 @@ AXES_OF = (
     "call",
     [
         f"slipsweep.sweep({AXES_OF}, variables=['permanent_displacement'])",
-        "slipsweep.sweep(5.0, 0.5, 4.0, np.linspace(0.1, 9, sizes[0] * sizes[3]), variables=['validity'], "
+        "slipsweep.sweep(5.0, 0.5, 4.0, np.linspace(0.1, 9, sizes[0] * sizes[3]), "
+        "variables=['validity'], "
         "structure_frequency=np.linspace(0.1, 9, sizes[1] * sizes[2]))",
     ],
     ids=["displacement", "structure_frequency"],

@@ -1,4 +1,4 @@
-"""Compiled kernels on disk: one process compiles, an old one is never served, and without a folder all still runs."""
+"""Compiled kernels on disk: a single process compiles, and no old kernel is served."""
 
 import errno
 import json
@@ -58,7 +58,7 @@ def environment(tmp_path: Path, **others: str) -> dict[str, str]:
     )
 
 
-#: Damages each file of a kernel in turn, and says what the kernel returns then, and if it was compiled.
+#: Damages each file of a kernel in turn; prints what the kernel returns, and if it was compiled.
 DAMAGED = """
 import json
 import sys

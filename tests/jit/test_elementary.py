@@ -1,4 +1,4 @@
-"""The elementary functions of the kernels, in loops, against mpmath; errors in units in the last place."""
+"""Elementary functions of the kernels, in loops, against mpmath; errors in ulp."""
 
 import math
 from collections.abc import Callable

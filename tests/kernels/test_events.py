@@ -9,7 +9,7 @@ import pytest
 import slipsweep
 from slipsweep import RunError
 from slipsweep.grid import solvers
-from slipsweep.kernels import events, step
+from slipsweep.kernels import roots, step
 from slipsweep.kernels.block import UNSOLVED
 
 
@@ -19,7 +19,7 @@ def _power(where: tuple[float, float], x: float) -> tuple[float, float]:
     return math.copysign(abs(x - root) ** power, x - root), power * abs(x - root) ** (power - 1.0)
 
 
-_root_of_power = events.root_of(_power)
+_root_of_power = roots.root_of(_power)
 
 
 @numba.njit  # type: ignore[untyped-decorator]

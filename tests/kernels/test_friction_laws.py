@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import registered
-from slipsweep.kernels import step
+from slipsweep.kernels import step, step_cells
 from slipsweep.kernels.block import EQ12, LITERAL, NEWMARK, RESULTS, Options
 from slipsweep.motion.cutting import path_of_waveform
 from slipsweep.motion.waveforms import Sine
@@ -46,7 +46,7 @@ def solve_of_velocity(
     cells: Any, options: Any, path: Any, blocks: Any, steps: Any, log: Any, results: Any
 ) -> None:
     law = step.Law(of_velocity, True, False, True, step.unlimited)
-    step.solve_cells(law, cells, options, path, blocks, steps, log, results)
+    step_cells.solve_cells(law, cells, options, path, blocks, steps, log, results)
 
 
 @kernel
@@ -54,14 +54,16 @@ def solve_decaying(
     cells: Any, options: Any, path: Any, blocks: Any, steps: Any, log: Any, results: Any
 ) -> None:
     law = step.Law(decaying_with_both, True, False, False, step.unlimited)
-    step.solve_cells(law, cells, options, path, blocks, steps, log, results)
+    step_cells.solve_cells(law, cells, options, path, blocks, steps, log, results)
 
 
 def motion_of(
     solve: Callable[..., None], rise: int, cycles: int, steps_per_cycle: int, **cell: float
 ) -> dict[str, float]:
     """Step a cell, by Simpson's rule; V and W are times ω and ω²."""
-    cells = np.full((1, len(step.STEP_CELL.names or ())), np.nan).view(step.STEP_CELL)[:, 0]
+    cells = np.full((1, len(step_cells.STEP_CELL.names or ())), np.nan).view(step_cells.STEP_CELL)[
+        :, 0
+    ]
     cells["tan_theta"] = tan(THETA)
     cells["seconds"] = 1.0 / OMEGA
     for name, value in cell.items():
@@ -72,8 +74,8 @@ def motion_of(
         cells,
         Options(rise, EQ12, cycles, True, G),
         path,
-        step.blocks_of(step.SIMPSON, steps_per_cycle, 0),
-        step.steps_of(path, step.SIMPSON, steps_per_cycle, 0),
+        step_cells.blocks_of(step.SIMPSON, steps_per_cycle, 0),
+        step_cells.steps_of(path, step.SIMPSON, steps_per_cycle, 0),
         np.empty(0, step.LOG),
         results,
     )

@@ -75,7 +75,8 @@ def test_choices_are_frozen_and_come_back_from_their_repr(keyword: str, choice: 
 def test_equal_however_the_numbers_are_given() -> None:
     assert Sine(cycles=3.0) == Sine(3)  # type: ignore[arg-type]
     assert repr(Sine(3, ramp_in=1)) == "Sine(cycles=3, ramp_in=1.0, ramp_out=0.0)"
-    assert Harmonics((1, 0.5), (1, 2)) == Harmonics([1.0, 0.5], [1.0, 2.0], [0, 0])  # type: ignore[list-item]
+    lists: Any = ([1.0, 0.5], [1.0, 2.0], [0, 0])
+    assert Harmonics((1, 0.5), (1, 2)) == Harmonics(*lists)
 
 
 def test_a_name_is_the_choice_with_its_defaults() -> None:

@@ -1,4 +1,4 @@
-"""Arguments of the public functions: what is no value, and what cannot stand in a dataset, is refused by name."""
+"""Arguments of the public functions: values that are not allowed are refused by their names."""
 
 from collections.abc import Callable
 from decimal import Decimal

@@ -1,4 +1,4 @@
-"""The paper's two experiments: Tables 1 and 2 digit for digit, and what its formulas give where they differ."""
+"""The paper's two experiments: Tables 1 and 2 digit for digit, and its formulas."""
 
 from typing import Any
 
@@ -47,7 +47,7 @@ def test_tables_1_and_2(
     least: str,
     decay: str,
 ) -> None:
-    """But for lambda: Eq. 6 at the peak does not give that of Table 2, and no formula is bent to hide it."""
+    """But for lambda: Eq. 6 at the peak does not give that of Table 2."""
     parameters = slipsweep.friction_parameters(**experiment, model=slipsweep.Mendez(g=9.81))
     assert printed(parameters.limiting_acceleration) == limit, (
         "Eq. 7: limiting acceleration, Table 1"
@@ -135,7 +135,7 @@ def test_what_the_inputs_are_worth(
     newmark: str,
     flags: Validity,
 ) -> None:
-    """The two experiments with what is measured, printed or estimated, Newmark's block beside them; mm."""
+    """Displacements of both experiments, measured, printed and estimated, and Newmark's; mm."""
     result = slipsweep.sweep(
         **(experiment | given),
         frequency=frequency,

@@ -1,4 +1,4 @@
-"""Units of what users give: numbers with a unit in one text, and factors to the parameters' own units."""
+"""Units of inputs: numbers with a unit in a text, and factors to the units of the parameters."""
 
 import math
 

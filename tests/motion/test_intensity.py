@@ -1,4 +1,4 @@
-"""Intensity measures: closed forms, the same whatever the sampling of the same straight lines, and eqsig's."""
+"""Intensity measures: closed forms, other samplings of the same straight lines, and eqsig."""
 
 import math
 from typing import Any
@@ -121,7 +121,7 @@ def test_motions_without_a_measure() -> None:
 
 
 def test_as_eqsig_has_them() -> None:
-    """On the motions that pySLAMMER ships; eqsig's trapezoids have the straight lines sampled 16 times as finely."""
+    """Motions of pySLAMMER; eqsig's trapezoids have the straight lines 16 times as finely."""
     eqsig = pytest.importorskip("eqsig")
     pyslammer = pytest.importorskip("pyslammer")
     for name, motion in pyslammer.sample_ground_motions().items():

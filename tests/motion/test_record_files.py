@@ -1,4 +1,4 @@
-"""Files of recorded motions: formats, units, baseline, channels, what is missing or implausible, what is refused."""
+"""Files of recorded motions: formats, units, baseline, channels, warnings and refusals."""
 
 import hashlib
 from math import pi
@@ -11,7 +11,11 @@ import pytest
 
 from slipsweep import InputError, Record, read_record, read_suite
 
-AT2 = "PEER STRONG MOTION DATABASE RECORD\nA PLACE, 1/1/2000\nACCELERATION TIME HISTORY IN UNITS OF G\n"
+AT2 = (
+    "PEER STRONG MOTION DATABASE RECORD\n"
+    "A PLACE, 1/1/2000\n"
+    "ACCELERATION TIME HISTORY IN UNITS OF G\n"
+)
 
 #: Typed in after the description of the format: 2^23 counts are 2000 gal, at 100 samples a second
 #: for 0.05 s.
@@ -359,7 +363,7 @@ def test_a_trace_of_obspy() -> None:
 
 
 def test_cosmos_by_its_columns() -> None:
-    """Eight values to a line in columns of ten, cm/s², at 200 samples a second; the last ones touch."""
+    """Eight values to a line in columns of ten, cm/s², at 200 samples a second; the last touch."""
     record = read_record(V1)
     expected = [
         0.03630,
@@ -382,7 +386,10 @@ def test_cosmos_by_its_columns() -> None:
 def test_cosmos_with_several_channels(tmp_path: Path) -> None:
     first = V1.read_text()
     end = first.index("End-of-data")  # a V2 file has velocities behind its accelerations
-    pts = "       2 velocity pts, approx 0 secs, units=cm/s (05),Format=(8F10.5)\n   1.00000   2.00000\n"
+    pts = (
+        "       2 velocity pts, approx 0 secs, units=cm/s (05),Format=(8F10.5)\n"
+        "   1.00000   2.00000\n"
+    )
     other = first.replace("   0.03630", "  77.00000")
     velocity = first.replace("       1       1       4     120", "       2       2       5     120")
     path = write(tmp_path, "three.V2", first[:end] + pts + first[end:] + velocity + other)

@@ -1,4 +1,4 @@
-"""Suites: what is read of folders, patterns and lists, how motions are told apart, pairs of components."""
+"""Suites: folders, patterns and lists; labels of the motions; pairs of components."""
 
 import pickle
 from pathlib import Path

@@ -52,7 +52,7 @@ def exact(waveform: Waveform, phase: np.ndarray) -> np.ndarray:
 
 @each
 def test_pieces_are_the_wave(name: str) -> None:
-    """1e-14 and the rounding of mφ, monotone and of one sign; harmonics of fifty times the frequency included."""
+    """To 1e-14 and the rounding of mφ, monotone and of one sign; harmonics up to the fiftieth."""
     waveform = EVERY[name]
     wave = wave_of(waveform)
     fastest = max(waveform.multiples) if isinstance(waveform, Harmonics) else 1
@@ -105,7 +105,7 @@ THREE_ZEROS = Harmonics([0.2536777542789753, 0.1692128468453051], [2, 3], cycles
 
 @pytest.mark.parametrize("power", range(1, 6))
 def test_zeros_that_lie_close_together_are_told_apart(power: int) -> None:
-    """a sin 2φ + b sin 3φ = sin φ (2a cos φ + b (4 cos² φ − 1)) in closed form, about π at distances 10⁻¹ to 10⁻⁵."""
+    """a sin 2φ + b sin 3φ = sin φ (2a cos φ + b (4 cos² φ − 1)), 10⁻¹ to 10⁻⁵ about π."""
     a = 1.0
     b = 2 / 3 * (1 + 10.0 ** (-2 * power))
     ends = wave_of(Harmonics([a, b], [2, 3], cycles=1)).pieces
@@ -118,7 +118,7 @@ def test_zeros_that_lie_close_together_are_told_apart(power: int) -> None:
 
 
 def test_friction_turns_at_each_zero() -> None:
-    """Continuous sliding over three close zeros, against Gauss's rule between them; all solvers share the pieces."""
+    """Continuous sliding over three close zeros, against Gauss's rule between them."""
     theta = 0.0
     mu_s = 0.33292316
     amplitude = 8.9043785

@@ -64,7 +64,9 @@ def test_without_noise_the_parameters_come_back(clean: dict[str, xr.Dataset], mo
 
 
 @pytest.mark.parametrize("mode", CALIBRATED)
-def test_noise_digitisation_and_cycles(noisy: dict[str, xr.Dataset], mode: str) -> None:
+def test_intervals_hold_the_truth_under_noise_and_a_converter(
+    noisy: dict[str, xr.Dataset], mode: str
+) -> None:
     found = noisy[mode]
     case = CALIBRATED[mode]
     check_intervals(found, case)
@@ -232,7 +234,7 @@ def test_a_crest_is_told_from_a_flat_top(noise: float, bits: int | None) -> None
 
 
 @pytest.mark.parametrize("kinetic", [0.38, 0.25])
-def test_coulombs_block_is_newmarks(kinetic: float) -> None:
+def test_a_block_of_constant_friction_gets_newmarks_tables(kinetic: float) -> None:
     test = coulomb(kinetic).isel(time=slice(None, None, 2))
     found = slipsweep.calibrate(test, 6.0, 0.38, cycles=False)
     first = found.attrs["findings"].splitlines()[0]
@@ -253,7 +255,7 @@ def test_coulombs_block_is_newmarks(kinetic: float) -> None:
 
 
 @pytest.mark.parametrize("missing", ["block_acceleration", "relative_velocity"])
-def test_a_missing_channel(clean: dict[str, xr.Dataset], missing: str) -> None:
+def test_two_channels_of_the_block_are_enough(clean: dict[str, xr.Dataset], missing: str) -> None:
     found = calibrated(measured(clean["stick_slip"], seed=2).drop_vars(missing))
     check_intervals(found, CALIBRATED["stick_slip"])
     assert f"misfit_{missing}" not in found
@@ -296,14 +298,14 @@ def test_sensors_at_fault() -> None:
         assert abs(float(said[0]) - true) < min(3.0 * float(said[1]), 0.1 * true), name
 
 
-def test_unequal_sampling_gaps_and_an_early_end(clean: dict[str, xr.Dataset]) -> None:
+def test_intervals_hold_the_truth_with_gaps_and_an_early_end(clean: dict[str, xr.Dataset]) -> None:
     test = measured(clean["stick_slip"], seed=7).isel(time=slice(0, 312))
     kept = np.sort(np.random.default_rng(1).permutation(test.time.size)[: test.time.size * 3 // 4])
     test.relative_velocity.values[180:240] = np.nan
     check_intervals(calibrated(test.isel(time=kept)), CALIBRATED["stick_slip"])
 
 
-def test_a_block_that_slips_upslope(clean: dict[str, xr.Dataset]) -> None:
+def test_slips_upslope_are_left_out_and_named(clean: dict[str, xr.Dataset]) -> None:
     test = measured(clean["stick_slip"], seed=8)
     time = test.time.values
     for begin in (1.36, 2.36):
@@ -325,7 +327,7 @@ def test_a_record_that_begins_in_motion_is_named(clean: dict[str, xr.Dataset]) -
     assert "The table moves as the record begins, at " in late.attrs["findings"]
 
 
-def test_the_tables_to_paste_run(noisy: dict[str, xr.Dataset], tmp_path: Path) -> None:
+def test_a_sweep_file_of_both_tables_runs(noisy: dict[str, xr.Dataset], tmp_path: Path) -> None:
     found = noisy["stick_slip"]
     given = {"theta": 5, "mu_s": 0.38, "amplitude": 3, "frequency": 2}
     axes = "".join(f"\n[axes.{name}]\nvalues = [{value}]\n" for name, value in given.items())

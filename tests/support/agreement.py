@@ -119,7 +119,7 @@ class Group:
 
 @dataclass(frozen=True)
 class Comparison:
-    """One cell solved in two ways: the difference of the results over its bound (agreed: 1 at most)."""
+    """Difference of a cell solved in two ways, over its bound: 1 at most if they agree."""
 
     kind: str
     regime: str
@@ -263,7 +263,7 @@ def _sweep(cells: dict[str, Array], options: dict[str, Any]) -> Found:
 
 
 def exact_of(group: Group, size: float) -> Found:
-    """What the cycle solver says of the cells, row 0, and of each with all its inputs moved up or down by `size`."""
+    """Results of the cycle solver: the cells in row 0, below with all inputs moved by ± `size`."""
     generator = np.random.default_rng(group.seed % 2**32)
     # any two of the inputs, of which there are eight at most, move in the same direction in half of
     # the moves
@@ -277,7 +277,7 @@ def exact_of(group: Group, size: float) -> Found:
 
 
 def _outcome(mode: Any, validity: Any) -> tuple[int, int]:
-    """Mode and validity, but for `UPSLOPE`: the sign of a displacement, which may be 0 but for roundings."""
+    """Mode and validity without `UPSLOPE`, which rounding may raise where a displacement is 0."""
     return int(mode), int(validity) & ~int(Validity.UPSLOPE)
 
 
@@ -375,7 +375,7 @@ def _stepped(group: Group, exact: Found) -> Iterator[Comparison]:
 
 
 def _histories(group: Group, exact: Found) -> Iterator[Comparison]:
-    """`simulate`: its end, and the largest velocity of the samples; of cells that slide on into the next pulse, too."""
+    """Last displacement and largest velocity of `simulate`, also for continuous sliding."""
     cycles = group.options["cycles"]
     carried = [
         j for j in range(len(group.regimes)) if exact["validity"][0, j] & Validity.NOT_RECOUPLED

@@ -37,8 +37,9 @@ Found = tuple[float, float, int, int]
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """A line of a table of tests/data; results as printed, None for what is not given and empty for no value.
+    """Line of a table of tests/data.
 
+    Results are text as printed, empty if there is no value; an input is None if it is not given.
     The bounds are of hard cases: how far the answer moves, in m and m/s, and the (mode, validity)
     within one ulp of it.
     """
@@ -92,13 +93,16 @@ class Case:
 
     @property
     def uplift(self) -> bool:
-        """Whether A tan(theta) >= g, where the model gives no value (cases.csv has one such line)."""
+        """True if A tan(theta) >= g: the model gives no value (cases.csv has one such line)."""
         return (
             self.model == "mendez" and self.amplitude * math.tan(math.radians(self.theta)) >= self.g
         )
 
     def missed(self, found: Found, relative: float, absolute: float = 1e-12) -> str:
-        """What is wrong with an answer beyond relative |u| + absolute A/omega**2, likewise for v; "" if nothing is."""
+        """Return a message if u differs by more than relative |u| + absolute A/omega**2, else "".
+
+        Likewise v, with A/omega.
+        """
         for value, exact, scale in zip(
             found,
             (self.permanent_displacement, self.peak_relative_velocity),
@@ -118,7 +122,7 @@ class Case:
 
 
 def _times(answer: float, exact: str, bound: str) -> float:
-    """|answer − exact| / bound in decimals: any of them may be subnormal; NaN counts as infinitely far."""
+    """|answer − exact| / bound, infinite for NaN; in decimals, as each may be subnormal."""
     if not math.isfinite(answer):
         return math.inf
     with localcontext(prec=60):
@@ -141,8 +145,7 @@ def _value(kind: Any, text: str) -> Any:
 
 
 def choices(**given: Any) -> dict[str, Any]:
-    """Arguments of `slipsweep.sweep` from options as tables of cases have them, each in a column of its own.
-
+    """Arguments of `slipsweep.sweep` from options in the columns of a table of cases.
     A column that does not go with a row's model, waveform or solver is left out; where a row has
     no option of a model, a waveform or a solver, the function's own default stays.
     """

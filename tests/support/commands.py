@@ -64,7 +64,7 @@ def slipsweep(
     environment: Mapping[str, str] | None = None,
     preexec_fn: Callable[[], object] | None = None,
 ) -> "subprocess.CompletedProcess[str]":
-    """Run a command in `folder` as a process, with `environment` on top of this one's, and wait for it."""
+    """Run a command in `folder` as a process, with `environment` added to this one's."""
     return subprocess.run(
         [*SLIPSWEEP, *map(str, arguments)],
         cwd=folder,

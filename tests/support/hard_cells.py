@@ -1,4 +1,4 @@
-"""The hard cases: where the model is hardest to solve, why, and what one ulp of an input does there.
+"""Cells in which the model is hardest to solve, the reason, and the effect of an ulp of an input.
 
 `CATEGORIES` makes their cells; ``python -m benchmarks.hard_cases`` solves them, and all
 their neighbours one ulp away, in multiple precision into data/hard_cases.csv.
@@ -54,7 +54,7 @@ def _ulps(value: float, count: int) -> float:
 
 
 def just_above_yield() -> Iterator[Cell]:
-    """u goes with (A − Üy)²: differences of nearly equal numbers lose all digits; the slide is shorter than a step."""
+    """u ~ (A − Üy)²: differences of nearly equal numbers; the slide is shorter than a step."""
     for theta, mu_s in PLANES:
         onset = _friction(theta, mu_s).yield_acceleration
         for k in (2, 5, 8, 11, 14):
@@ -339,7 +339,7 @@ def neighbours(cell: Cell) -> Iterator[Cell]:
 
 
 def bound_of(value: mpfr, others: Iterable[mpfr], dtype: str = "float64") -> mpfr:
-    """How far a result is from those of its neighbours that have one, plus half an ulp of its own."""
+    """Largest difference from the results of the neighbours, plus half an ulp of the result."""
     moves = [abs(other - value) for other in others if not gmpy2.is_nan(other)]
     return (
         max(moves, default=mpfr(0)) + mpfr(float(np.spacing(np.dtype(dtype).type(abs(value))))) / 2
@@ -347,7 +347,7 @@ def bound_of(value: mpfr, others: Iterable[mpfr], dtype: str = "float64") -> mpf
 
 
 def conditioning(cell: Cell, dtype: str = "float64") -> dict[str, str]:
-    """The reference's answer, and the bounds of displacement and peak velocity, as one input moves by one ulp."""
+    """Results of the reference, and their bounds: the effect of an ulp of an input."""
     answer = reference.solve(**cell)
     others = [reference.solve(**other) for other in neighbours(cell)]
     found = {"sliding_mode": str(answer.sliding_mode), "validity": str(answer.validity)}

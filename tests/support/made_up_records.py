@@ -19,7 +19,7 @@ from tests.support.reference import solve_record
 
 
 def band_noise() -> Record:
-    """Noise with a band and an envelope of earthquakes: pulses of all sizes, several maxima each."""
+    """Noise with the band and envelope of earthquakes: pulses of all sizes, of several maxima."""
     rng = np.random.default_rng(7)
     times = np.arange(0.0, 20.0, 0.01)
     phases = rng.uniform(0, 2 * np.pi, 60)

@@ -1,4 +1,4 @@
-"""The shaking in sections on which Üg is smooth, monotone and of one sign; roots and integrals to any precision."""
+"""Shaking in sections on which Üg is smooth, monotone and of one sign; roots and integrals."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -111,7 +111,7 @@ class Section:
         return replace(self, start=self.phase(ground), first=ground)
 
     def integrals(self, rate: Function, start: mpfr, end: mpfr, decay: mpfr) -> tuple[mpfr, mpfr]:
-        """Integrals of rate(Üg) and of (end - φ) rate(Üg); `decay` is that of the friction in it, 1/(m/s²)."""
+        """Integrals of rate(Üg) and (end - φ) rate(Üg); `decay` of its friction in 1/(m/s²)."""
         rule = _gauss_legendre(30 if decay else self.nodes, decimals())
         cuts = [start, end]
         if decay:  # the friction falls by e^-8 at most over a part, until it is negligible
@@ -139,7 +139,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Waveform:
-    """A wave of peak 1 under its envelope; `harmonics` are "amplitude:multiple:phase in degrees, ..."."""
+    """A wave of peak 1 under its envelope; `harmonics`: "amplitude:multiple:phase (°), ..."."""
 
     name: str
     harmonics: str

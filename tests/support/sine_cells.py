@@ -1,4 +1,4 @@
-"""Cells under a sine solved twice, thousands at once: in SIMD batches, and from event to event as under any wave.
+"""Cells under a sine solved twice: in SIMD batches, and from event to event as under any wave.
 
 `tests/kernels/test_agreement.py` does so for some sweeps, ``python -m benchmarks.agreement`` for
 many.
@@ -44,7 +44,7 @@ class Drawn:
     cells: dict[str, Array]
 
     def swept(self, cells: dict[str, Array], walked: bool = True) -> xr.Dataset:
-        """The cells, or some of them; a sine that is called a harmonic takes the walk of all waves."""
+        """Sweep of cells; a sine declared as a harmonic takes the walk of all waves."""
         columns: dict[str, Any] = {
             name: xr.DataArray(values, dims="cell") for name, values in cells.items()
         }
@@ -62,7 +62,7 @@ class Drawn:
 
 
 def drawn(seed: int, count: int) -> Drawn:
-    """Cells of all modes, with slides and modes that are only just reached, and with friction given or estimated."""
+    """Cells of all modes, some only just reached, with friction given or estimated."""
     rng = np.random.default_rng(seed)
 
     def between(low: float, high: float) -> Array:
@@ -94,7 +94,7 @@ def drawn(seed: int, count: int) -> Drawn:
 
 
 def times_bound(one: Drawn) -> Array:
-    """Of each cell how far the two ways differ over the bound, in displacement or largest velocity: 1 at most."""
+    """Difference of the two ways over its bound, of displacement or largest velocity, by cell."""
     batches = one.swept(one.cells, walked=False)
     walk = one.swept(one.cells)
     drives = one.cells["amplitude"] + G * (one.cells["mu_s"] + one.cells.get("delta_mu", 0.0))

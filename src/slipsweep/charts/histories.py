@@ -104,7 +104,7 @@ def history(result: Result, options: Options) -> Figure:
 def _draw_thresholds(panel: Axes, data: xr.Dataset) -> None:
     """Draw lines at the accelerations of yield and of the mode limit, if the base comes near."""
     lines = thresholds(data)
-    if "upslope_line" in lines:  # a line either way, not that of the first of them
+    if "upslope_line" in lines:  # lines downslope and upslope, not the smaller of the two
         lines = lines.drop_vars("yield_line")
     highest = data["half_wave_peak"].values.max(initial=0.0)
     lowest = data["ground_acceleration"].values.min(initial=0.0)

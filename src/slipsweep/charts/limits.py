@@ -4,9 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from slipsweep.charts import equations, style
+from slipsweep.charts.regions import Cells
 from slipsweep.charts.sheet import (
     Drawing,
     Panel,
@@ -26,8 +29,10 @@ from slipsweep.model.variables import STRENGTHS, LimitStatus, StrengthStatus
 from slipsweep.published import EQUATIONS
 from slipsweep.studies.suite_statistics import SUITE, limit_quantiles
 
-#: Most grid points of annual rates, a curve each; most displacements that are marked.
+#: Most curves of annual rates, one for each grid point.
 _MOST_CURVES = 8
+
+#: Most displacements that are marked without being requested.
 _MOST_MARKS = 20
 
 
@@ -51,7 +56,7 @@ def limit(result: Result, options: Options) -> Figure:
             labels = [style.plain(name) for name in axis_labels(sheet.data, sheet.x)]
             panel.axes.set_xticks(panel.xs, labels, rotation=40, ha="right")
             panel.axes.set_xlabel(sheet.x)
-    # one scale for all, from zero; only now, for it ends the autoscaling
+    # one scale for all, from zero; it is set last, because it ends the autoscaling
     sheet.panels[0].axes.set_ylim(bottom=0.0)
     if not np.isfinite(sheet.data["limit_amplitude"]).any():
         sheet.note("No limits to draw: limit_status has the reasons.")
@@ -232,25 +237,16 @@ def hazard(result: Result, options: Options) -> Figure:
     Curves are dotted where more than half of the rate is held above the largest amplitude.
     """
     rates = result.data
-    grid = {
-        str(dim): size for dim, size in rates["annual_rate"].sizes.items() if dim != "threshold"
-    }
-    points = [zip(grid, at, strict=True) for at in np.ndindex(*grid.values())]
     if "equation" in rates.dims:
         labels = [EQUATIONS[str(name)].label for name in rates["equation"].values]
         rates = rates.assign_coords(equation=labels)
-    names = [
-        ", ".join(member_text(rates, dim, at, options) for dim, at in point) for point in points
-    ]
-    if len(names) > _MOST_CURVES:
-        most = f"a chart shows {_MOST_CURVES} at most; cut axes with --at NAME=VALUE"
-        raise InputError(f"{len(names)} grid points: {most}")
+    names = _names_of_curves(rates, options)
     thresholds = rates["threshold"].values
     few = thresholds.size <= _MOST_MARKS
     marks = np.isin(thresholds, thresholds if few else rates.attrs.get("marked", []))
-    lines, held = (
-        rates[name].values.reshape(-1, thresholds.size) for name in ("annual_rate", "held_rate")
-    )
+    lines = rates["annual_rate"].values.reshape(-1, thresholds.size)
+    held = rates["held_rate"].values.reshape(-1, thresholds.size)
+    is_held = held > 0.5 * lines
     if not (lines[:, marks if marks.any() else slice(None)] > 0.0).any():
         raise InputError(
             "no motion exceeds any of the given displacements: there is nothing to draw"
@@ -264,23 +260,13 @@ def hazard(result: Result, options: Options) -> Figure:
         ylabel=f"mean annual rate of {style.displacement_symbol(rates.attrs)} > d (1/year)",
     )
     panel.grid(color="0.9", which="both")
-    displacements = in_mm(thresholds)
-    for look, name, line, part in zip(curve_looks(len(names)), names, lines, held, strict=True):
-        shown = np.where((line > 0.0) & (thresholds > 0.0), line, np.nan)
-        above = part > 0.5 * line
-        joined = (
-            above | np.append(False, above[:-1]) | np.append(above[1:], False)
-        )  # no gaps between the two
-        dashed = {"color": look["color"], "linestyle": look["linestyle"]}
-        panel.plot(displacements, np.where(above, np.nan, shown), **dashed)
-        panel.plot(
-            displacements, np.where(joined, shown, np.nan), color=look["color"], linestyle=":"
-        )
-        handle = {**look, "linestyle": "none"} if marks.any() else dashed
-        (drawing.legend[name],) = panel.plot(displacements[marks], shown[marks], **handle)
+    xs = in_mm(thresholds)
+    for look, name, line, above in zip(curve_looks(len(names)), names, lines, is_held, strict=True):
+        rate = np.where((line > 0.0) & (thresholds > 0.0), line, np.nan)
+        drawing.legend[name] = _draw_rate(panel, xs, rate, above, marks, look)
     for axis, (low, high) in ((panel.xaxis, panel.get_xlim()), (panel.yaxis, panel.get_ylim())):
         log_ticks(axis, high / low)
-    if len(names) == 1:  # the caption has what the curve is of
+    if len(names) == 1:  # the caption has the grid point
         drawing.legend.clear()
     texts = [
         style.caption(rates, options),
@@ -291,14 +277,45 @@ def hazard(result: Result, options: Options) -> Figure:
         texts.append(" ".join(str(rates.attrs["conditions"]).splitlines()))
     if few:
         texts.append("Rates are computed at the markers; between them the lines are straight.")
-    if (held > 0.5 * lines).any():
-        ends = [float(rates.attrs[f"{name}_range"][-1]) for name in ("amplitude", "hazard_curve")]
-        what = (
-            "the largest amplitude of the sweep"
-            if ends[0] < ends[1]
-            else "the end of the hazard curve"
-        )
-        texts.append(
-            f"Dotted: more than half of the rate comes from above {what}, where P is held constant."
-        )
+    if is_held.any():
+        texts.append(_held_text(rates))
     return drawing.finish(texts)
+
+
+def _names_of_curves(rates: xr.Dataset, options: Options) -> list[str]:
+    """Return the names of the grid points of annual rates (InputError: they are too many)."""
+    sizes = rates["annual_rate"].sizes
+    grid = {str(dim): size for dim, size in sizes.items() if dim != "threshold"}
+    names = []
+    for indices in np.ndindex(*grid.values()):
+        point = zip(grid, indices, strict=True)
+        names.append(", ".join(member_text(rates, dim, index, options) for dim, index in point))
+    if len(names) > _MOST_CURVES:
+        raise InputError(
+            f"{len(names)} grid points: a chart shows {_MOST_CURVES} at most; cut axes with --at "
+            "NAME=VALUE"
+        )
+    return names
+
+
+def _draw_rate(
+    panel: Axes, xs: Floats, rate: Floats, is_held: Cells, marks: Cells, look: Look
+) -> Line2D:
+    """Draw a curve of annual rates, dotted where they are held; return its sign in the legend."""
+    # the dotted line begins where the other one ends
+    joined = is_held | np.append(False, is_held[:-1]) | np.append(is_held[1:], False)
+    dashed = {"color": look["color"], "linestyle": look["linestyle"]}
+    panel.plot(xs, np.where(is_held, np.nan, rate), **dashed)
+    panel.plot(xs, np.where(joined, rate, np.nan), color=look["color"], linestyle=":")
+    marked = {**look, "linestyle": "none"} if marks.any() else dashed
+    (line,) = panel.plot(xs[marks], rate[marks], **marked)
+    return line
+
+
+def _held_text(rates: xr.Dataset) -> str:
+    """Return the caption's sentence on rates that come from above the largest amplitude."""
+    ends = [float(rates.attrs[f"{name}_range"][-1]) for name in ("amplitude", "hazard_curve")]
+    end = "the end of the hazard curve"
+    if ends[0] < ends[1]:
+        end = "the largest amplitude of the sweep"
+    return f"Dotted: more than half of the rate comes from above {end}, where P is held constant."

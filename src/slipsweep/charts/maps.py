@@ -103,8 +103,8 @@ def contours(result: Result, options: Options) -> Figure:
         style.length_text(level) if of_length else style.with_unit(f"{level:.3g}", style.unit(name))
         for level in levels
     ]
-    # what is below the lowest level, or nothing, is a hundredth of it; what does not slide is
-    # covered later
+    # values below the lowest level, zeros too, are drawn as a hundredth of it; the area of no
+    # sliding is covered later
     sheet.data["drawn"] = drawn.clip(min=levels[0] / 100)
     colours = style.COLOURS.resampled(len(levels) + 1)
     end = "min" if drawn.max() < levels[-1] else "both"
@@ -127,7 +127,7 @@ def newmark(result: Result, options: Options) -> Figure:
         sheet.note("No ratio: no displacement above zero.")
         return _finish(sheet, DISPLACEMENT)
     farthest = np.abs(np.log10(there)).max()
-    # the colour changes at these and at their inverses; the first is as good as one
+    # the colour changes at these ratios and at their inverses; 1.1 counts as no difference
     above = [
         1.1,
         *(level for level in (1.5, 2.0, 3.0, 5.0, 10.0, 30.0, 100.0) if np.log10(level) < farthest),
@@ -149,7 +149,7 @@ def modes(result: Result, options: Options) -> Figure:
     )
     for panel in sheet.panels:
         codes = panel.grid("sliding_mode")
-        # continuous sliding and no sliding cover what they take of the rest
+        # the areas of continuous sliding and of no sliding are drawn over that of stick-slip
         margins = {
             SlidingMode.STUCK: (-regions.excess_over(panel, "yield_line"), _STUCK),
             SlidingMode.STICK_SLIP: (np.ma.ones(codes.shape), _VALUES),
@@ -211,7 +211,7 @@ def _fill_panels(
             if not shown.count():
                 continue
             filled = np.ma.masked_invalid(regions.continued(logs, inside))
-            # what contours leave open along cells without a value has the colours of the cells
+            # contours leave gaps along cells without a value; there the cells are drawn
             cells = panel.axes.pcolormesh(*edges, filled, zorder=0.4, rasterized=True, **look)
             areas = panel.axes.contourf(xs, ys, filled, places, zorder=_VALUES, extend=end, **look)
             for artist in (cells, areas):
@@ -231,7 +231,7 @@ def _fill_panels(
 
 def _label_contours(panel: Panel, drawn: Any, texts: dict[float, str]) -> None:
     """Label each contour at its point farthest from frame and other lines, if there is space."""
-    # inches, that a label takes to each side, and that it needs to the next line
+    # space of a label to each side, and to the next line, inches
     label_space = 0.28
     line_space = 0.11
     inches = panel.axes.transData + panel.axes.figure.dpi_scale_trans.inverted()
@@ -401,7 +401,7 @@ def _large(panel: Panel, cells: Cells) -> Cells:
     window = panel.axes.bbox.transformed(panel.axes.figure.dpi_scale_trans.inverted())
     least = np.ceil(0.09 * np.array(cells.shape) / (window.height, window.width))
     high, wide = np.maximum(1, least).astype(int)
-    # beyond the frame a region may go on
+    # a region at the frame may continue beyond it
     around = np.pad(cells, [(high, high), (wide, wide)], "edge")
     inner = ndimage.binary_opening(around, np.ones((high, wide)))[high:-high, wide:-wide]
     return np.asarray(ndimage.binary_propagation(inner, np.ones((3, 3)), mask=cells))

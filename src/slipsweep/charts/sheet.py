@@ -53,16 +53,18 @@ _DASHES = (
 _MARKERS = ("o", "s", "^", "D", "v", "x")
 _MARKED = 7
 
-#: Width of a figure of one panel, inches; characters of a caption in an inch, and in a label's line
-#: of a small panel.
+#: Width of a figure of one panel, inches.
 _WIDTH = 7.0
+
+#: Characters of a caption in an inch.
 _CHARACTERS = 15
+
+#: Characters in a line of a label of a small panel.
 _LABEL = 26
 
-#: Height of a line of a caption or legend, inches, and lines that the usual height has a place for.
+#: Height of a line of a caption or legend, inches, and number of lines in the usual height.
 _LINE = 0.165
 _LINES = 4
-
 
 #: Name of colour maps without colour.
 _GREY = "grey of slipsweep"
@@ -178,7 +180,7 @@ class Drawing:
         above = 0 if beside or not entries else math.ceil(len(entries) / columns) * longest - 1
         lines: float = max(0, above + len(caption) - _LINES)
         if self.options.title:
-            # the layout has no place for a legend below a title of the figure: it is the legend's
+            # the layout cannot put a legend below the title of the figure: it becomes the legend's
             is_left = bool(entries) and beside  # of the legend
             shown = textwrap.fill(self.options.title, int((0.42 if is_left else 0.66) * characters))
             lines += shown.count("\n") + 1.5
@@ -468,7 +470,7 @@ def _second_scale(axes: Axes, side: str, g: float, units: str, symbol: str) -> N
         "right" if side == "y" else "top", functions=(lambda a: a * factor, lambda a: a / factor)
     )
     low, high = getattr(axes, f"get_{side}lim")()
-    # it would take them when it is drawn, too late for the layout to leave space for its numbers
+    # set now: matplotlib would set them when it draws, after the layout has left space for numbers
     other.set(**{f"{side}lim": (low * factor, high * factor), f"{side}label": text})
     if getattr(axes, f"get_{side}scale")() == "log":
         log_ticks(getattr(other, f"{side}axis"), high / low)

@@ -77,7 +77,7 @@ class Result:
         if not self.variables:
             raise InputError(f'{name}: not a result of "slipsweep run"')
         recorded = self.sort in ("record", "suite")
-        #: The recorded motion or motions, if the file has them; and the one to solve slices under.
+        #: The recorded motion or motions, if the file has them, and the record of a slice.
         self.shaking = read_embedded(data, Path(name)) if recorded else None
         self.motion = self.shaking if self.sort == "record" else None
         data = data[self.variables]
@@ -312,7 +312,7 @@ class Result:
             if dim in options.at and dim not in keep:
                 why = "is an axis of this chart; it cannot have one value"
                 raise InputError(f"{self.name}: {dim} = {options.at[dim]}: {why}")
-        # more than one value for every two dots on paper are lost
+        # paper does not resolve more points
         thinned = {
             dim: slice(0, size, math.ceil(size / _POINTS)) for dim, size in self.data.sizes.items()
         }

@@ -158,7 +158,7 @@ def _draw_bars(sheet: Sheet, symbols: list[str]) -> None:
             at = np.arange(len(order)) + shift
             panel.axes.barh(at, values, height=0.36, color=colour)
             sheet.legend[text] = Patch(color=colour)
-            # a bootstrap's interval may, by a hair, not hold the estimate; NaN: there is none
+            # the interval of a bootstrap may end just beside the estimate; NaN: there is none
             ends = np.maximum([values - low, high - values], 0.0)
             panel.axes.errorbar(values, at, xerr=ends, fmt="none", color="black", capsize=2.5)
         panel.axes.set_yticks(np.arange(len(order)), [symbols[at] for at in order])

@@ -136,7 +136,7 @@ def histogram(result: Result, options: Options) -> Figure:
             f"{result.name}: no motion slides in this slice; choose another slice (--at)"
         )
     edges = 10.0 ** np.histogram_bin_edges(np.log10(slid), "sturges")
-    # powers of logarithms are rounded: the least and the largest displacement must not lie outside
+    # edges are rounded; the smallest and the largest displacement must lie within them
     edges[0] = min(edges[0], slid.min())
     edges[-1] = max(edges[-1], slid.max())
     for panel in sheet.panels:

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from slipsweep.jit.decorators import elementary
+from slipsweep.jit.decorators import elementary, single
 
 #: Added to a float of magnitude below 2^51 it leaves the nearest integer in the low bits.
 _ROUND = 6755399441055744.0
@@ -56,7 +56,7 @@ _INVERSE_VERSINE = (
 _LOG = tuple(2.0 / power for power in range(3, 23, 2))
 
 
-@elementary
+@single
 def _polynomial(x: float, coefficients: tuple[float, ...]) -> float:
     """Σ cₖ xᵏ."""
     total = 0.0

@@ -13,16 +13,17 @@ import numpy as np
 
 from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.model import equations as eq
+from slipsweep.model.options import Recoupling, Rise
 from slipsweep.model.variables import VALUELESS, Validity
 
-#: How the block's acceleration rises with the base's (the `model` and `rise` options).
-NEWMARK = 0
-MONOTONE = 1
-LITERAL = 2
+#: Rise of the block's acceleration with the base's (the `model` and `rise` options).
+NEWMARK = int(Rise.NEWMARK)
+MONOTONE = int(Rise.MONOTONE)
+LITERAL = int(Rise.LITERAL)
 
-#: How the block recouples (the `recoupling` option).
-EQ12 = 0
-INTEGRATE = 1
+#: Rule by which the block recouples (the `recoupling` option).
+EQ12 = int(Recoupling.EQ12)
+INTEGRATE = int(Recoupling.INTEGRATE)
 
 STATICALLY_UNSTABLE = int(Validity.STATICALLY_UNSTABLE)
 UPLIFT = int(Validity.UPLIFT)
@@ -37,7 +38,7 @@ FRICTION_ESTIMATED = int(Validity.FRICTION_ESTIMATED)
 MAY_NOT_STOP = int(Validity.MAY_NOT_STOP)
 NOT_AT_REST = int(Validity.NOT_AT_REST)
 
-#: Not a flag of results: an event was not found (`events`), and the engine raises an error.
+#: Not a flag of results: a root was not found (`roots`), and the engine raises an error.
 UNSOLVED = 1 << 14
 NO_VALUE = int(VALUELESS) | UNSOLVED
 

@@ -14,7 +14,8 @@ from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import registered
 from slipsweep.jit.elementary import exp
 from slipsweep.kernels.block import Options
-from slipsweep.kernels.step import UP, Law, Steps, solve_cells
+from slipsweep.kernels.step import UP, Law, Steps
+from slipsweep.kernels.step_cells import solve_cells
 from slipsweep.motion.paths import Path
 
 #: A block of `kernels.step`.

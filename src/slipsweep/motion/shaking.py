@@ -1,6 +1,6 @@
-"""Tests on a shaking table: what was measured over time, read with names and units from the header.
+"""Tests on a shaking table: measurements over time, with names and units from the header.
 
-Nothing is taken off a channel here but what is asked for (`ShakingTest.corrected`).
+Offsets and drifts are subtracted from a channel only on request (`ShakingTest.corrected`).
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -19,12 +19,12 @@ from slipsweep.motion.lines import read_columns, read_lines
 from slipsweep.motion.reading import STANDARD_GRAVITY, UNITS
 from slipsweep.motion.records import check_samples, missing_samples
 
-#: What is measured of the table, and what the block may be measured by.
+#: Channels of the table and of the block.
 TABLE = "ground_acceleration"
 RESPONSES = ("block_acceleration", "relative_velocity", "relative_displacement")
 CHANNELS = (TABLE, *RESPONSES)
 
-#: Words of a column's name that say what it is: one of each set.
+#: Words in the name of a column that identify a channel: one word of each set.
 _NAMES: dict[str, tuple[set[str], ...]] = {
     "time": ({"time", "t"},),
     TABLE: (
@@ -69,9 +69,8 @@ class ShakingTest:
             name: np.where(np.isnan(values) & (name != TABLE), 0.0, values)
             for name, values in kept.items()
         }
-        check_samples(
-            self.name, times, filled, least=16
-        )  # fewer tell nothing of three parameters and their noise
+        # fewer samples do not determine three parameters and their noise
+        check_samples(self.name, times, filled, least=16)
         for name, values in kept.items():
             if np.isnan(values).all():
                 raise InputError(f"{self.name}: {name}: no sample")
@@ -80,26 +79,25 @@ class ShakingTest:
 
     @property
     def responses(self) -> tuple[str, ...]:
-        """What the block was measured by."""
+        """Channels of the block that were measured."""
         return tuple(name for name in RESPONSES if name in self.channels)
 
     def corrected(
         self, offset: Any = (), drift: Any = (), rest: Sequence[float] | None = None
     ) -> tuple["ShakingTest", list[str]]:
-        """The test less a constant (`offset`) or a straight line (`drift`) in some channels, "all" is all of them.
+        """Return the test less a constant (`offset`) or a line (`drift`) in channels, or "all".
 
         Constants and lines are fitted to the samples between the two times of `rest` (s), when the
         table and the block were at rest.  Without it they are fitted to all samples, which is right
-        for accelerations of a motion that begins and ends at rest.  Also returns what was taken off
-        each: its value at the first sample, and its slope.
+        for accelerations of a motion that begins and ends at rest.  The second value has a text for
+        each channel: the constant, at the first sample, and the slope.
         """
-        offset, drift = (
-            check_channels(*one, self.channels) for one in (("offset", offset), ("drift", drift))
-        )
+        offset = check_channels("offset", offset, self.channels)
+        drift = check_channels("drift", drift, self.channels)
         chosen = np.ones(self.times.size, dtype=bool)
         within = ""
         if rest is not None:
-            bounds = [check_finite("rest", one) for one in check_list("rest", rest, "two times")]
+            bounds = [check_finite("rest", time) for time in check_list("rest", rest, "two times")]
             if len(bounds) != 2:
                 raise InputError(f"rest = {shown(rest)}: must be two times, s")
             chosen = (self.times >= bounds[0]) & (self.times <= bounds[1])
@@ -107,7 +105,9 @@ class ShakingTest:
         channels = dict(self.channels)
         removed = []
         since = self.times - self.times[0]
-        for name in (one for one in CHANNELS if one in (*offset, *drift)):
+        for name in CHANNELS:
+            if name not in (*offset, *drift):
+                continue
             use = chosen & np.isfinite(channels[name])
             if use.sum() < 3:
                 raise InputError(
@@ -117,7 +117,8 @@ class ShakingTest:
                 since[use], channels[name][use], 1 if name in drift else 0
             )
             channels[name] = channels[name] - line(since)
-            constant, slope = (float(one(0.0)) for one in (line, line.deriv()))
+            constant = float(line(0.0))
+            slope = float(line.deriv()(0.0))
             unit = HISTORY[name]["units"]
             removed.append(
                 f"{name}: {constant:.4g} {unit}"
@@ -126,31 +127,37 @@ class ShakingTest:
         return replace(self, channels=channels), removed
 
 
-def check_channels(key: str, given: Any, known: Collection[str]) -> tuple[str, ...]:
-    """The channels that an option names: "all", one, or a list of them."""
-    if isinstance(given, str):
-        given = tuple(known) if given == "all" else (given,)
-    names = check_list(key, given, "channels")
+def check_channels(key: str, channels: Any, measured: Collection[str]) -> tuple[str, ...]:
+    """Return the channels that an option names: "all", one, or a list of them."""
+    if isinstance(channels, str):
+        channels = tuple(measured) if channels == "all" else (channels,)
+    names = check_list(key, channels, "channels")
     for name in names:
-        if not isinstance(name, str) or name not in known:
+        if not isinstance(name, str) or name not in measured:
             raise InputError(
-                f"{key} = {shown(name)}: must be 'all', or of the channels measured: {', '.join(known)}"
+                f"{key} = {shown(name)}: must be 'all', or of the channels measured: "
+                f"{', '.join(measured)}"
             )
     return tuple(names)
 
 
 def read_test(path: str | Path) -> ShakingTest:
-    """Read a test from a CSV file whose header names columns and units (`read_columns`); "g" is standard gravity.
+    """Read a test from a CSV file whose header names columns and units (`read_columns`).
 
-    Such as ``time (s), table acceleration (g), relative displacement (mm)``.  Columns of other
-    names are left out. InputError: the file cannot be read, a column has no unit, or a line holds
-    no numbers.
+    An example is ``time (s), table acceleration (g), relative displacement (mm)``.  The unit "g" is
+    standard gravity.  Columns of other names are left out.  InputError: the file cannot be read, a
+    column has no unit, or a line holds no numbers.
     """
     path = Path(path)
 
     def channel_of(column: str, words: set[str], unit: str) -> tuple[str, float] | None:
         channel = next(
-            (one for one, names in _NAMES.items() if all(words & either for either in names)), None
+            (
+                channel_name
+                for channel_name, names in _NAMES.items()
+                if all(words & either for either in names)
+            ),
+            None,
         )
         if channel and not unit:
             raise InputError(
@@ -168,13 +175,16 @@ def read_test(path: str | Path) -> ShakingTest:
     )
     if missing := "; ".join(missing_samples(values["time"], values[TABLE])):
         raise InputError(
-            f"{path}: {TABLE}: {missing}: samples are missing; take the part of the test that has all"
+            f"{path}: {TABLE}: {missing}: samples are missing; take the part of the test that has "
+            "all"
         )
     attrs = {"test": path.name.encode(errors="backslashreplace").decode(), "test_sha256": digest}
     return ShakingTest(values.pop("time"), values, str(path), attrs)
 
 
 def unit_factor(key: str, channel: str, unit: str) -> float:
-    """Factor from a unit of a channel to the SI unit."""
-    own = "s" if channel == "time" else HISTORY[channel]["units"]
-    return conversion(key, own, unit.lower() if unit.lower() in UNITS else unit, STANDARD_GRAVITY)
+    """Return the factor from a unit of a channel to the SI unit."""
+    si_unit = "s" if channel == "time" else HISTORY[channel]["units"]
+    return conversion(
+        key, si_unit, unit.lower() if unit.lower() in UNITS else unit, STANDARD_GRAVITY
+    )

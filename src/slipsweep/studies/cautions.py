@@ -8,13 +8,13 @@ from collections.abc import Hashable, Iterable
 
 import xarray as xr
 
-from slipsweep.grid.tally import Tally
 from slipsweep.model import equations
 from slipsweep.model.options import SOLVERS
 from slipsweep.model.variables import STRENGTHS, VALUELESS, SlidingMode, Validity
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.studies.boundaries import has_flags
+from slipsweep.studies.result_counts import Tally
 from slipsweep.studies.solved_again import (
     DISPLACEMENT,
     DRIVES,

@@ -11,9 +11,10 @@ import xarray as xr
 from xarray.indexes import PandasMultiIndex
 
 from slipsweep.errors import InputError
-from slipsweep.grid.inputs import Inputs
+from slipsweep.grid.inputs import Inputs, given_inputs
 from slipsweep.grid.plans import Plan, plan_friction_parameters, plan_sweep
 from slipsweep.model.choices import declared
+from slipsweep.model.docstrings import with_parameters
 from slipsweep.model.options import MODELS, SOLVERS, Model, Solver
 from slipsweep.model.parameters import shown
 from slipsweep.motion.records import Record
@@ -54,23 +55,18 @@ def naming_choices(function: Function) -> Function:
 
 
 @naming_choices
+@with_parameters
 def sweep(
     theta: Values | None = None,
     mu_s: Values | None = None,
     amplitude: Values | None = None,
     frequency: Values | None = None,
     *,
-    phi: Values | None = None,
     excitation: Excitation = "sine",
     model: Model | str = "mendez",
     solver: Solver | str = "auto",
+    phi: Values | None = None,
     displacement_amplitude: Values | None = None,
-    scale: Values | None = None,
-    pgv: Values | None = None,
-    arias_intensity: Values | None = None,
-    time_scale: Values | None = None,
-    polarity: Signs | None = None,
-    azimuth: Values | None = None,
     yield_acceleration: Values | None = None,
     yield_coefficient: Values | None = None,
     upslope_yield_acceleration: Values | None = None,
@@ -83,6 +79,12 @@ def sweep(
     fast_mu: Values | None = None,
     rate_constant: Values | None = None,
     structure_frequency: Values | None = None,
+    scale: Values | None = None,
+    pgv: Values | None = None,
+    arias_intensity: Values | None = None,
+    time_scale: Values | None = None,
+    polarity: Signs | None = None,
+    azimuth: Values | None = None,
     variables: Sequence[str] | None = None,
     chunks: Any = None,
     progress: Callable[[int], None] | None = None,
@@ -96,61 +98,6 @@ def sweep(
 
     Parameters
     ----------
-    theta : float, array or DataArray
-        Inclination of the base, degrees, 0 ≤ θ < 90.
-    mu_s : float, array or DataArray
-        Static friction coefficient, > 0.
-    amplitude : float, array or DataArray
-        Peak ground acceleration A, m/s², ≥ 0; a record, or every motion of a suite, is scaled to
-        it.
-    frequency : float, array or DataArray
-        Excitation frequency, Hz, > 0; not with a record.
-    phi : float, array or DataArray, optional
-        Friction angle, degrees, instead of `mu_s` = tan φ.
-    excitation : Sine, Cosine, Triangle, Square, Harmonics, Record, Suite or str
-        Motion of the base; "sine", "cosine", "triangle" and "square" are ten cycles without ramps.
-        All that is written about a record below holds for each motion of a suite.
-    model : Mendez, Newmark or str
-        The paper's friction law, or the classical rigid block; "mendez", "newmark".
-    solver : Cycle, Step or str
-        Event by event, exact to rounding, or time stepping; "auto" takes "cycle", but for a block
-        whose strength changes ``Step("simpson", 512)``.
-    displacement_amplitude : float, array or DataArray
-        Peak ground displacement d, m, instead of `amplitude`: A = (2πf)² d.  The result has A as a
-        coordinate, except if d and `frequency` span a grid: there it is a result, for `variables`.
-    scale : float, array or DataArray
-        With a record: factor on its acceleration, > 0, instead of `amplitude`; by default 1.
-    pgv, arias_intensity : float, array or DataArray
-        With a record, instead of `amplitude`: peak ground velocity or Arias intensity (m/s) that it
-        is scaled to, after `time_scale` has stretched it.
-    time_scale : float, array or DataArray
-        With a record: factor on its time, > 0; 2 makes it last twice as long.
-    polarity : {1, -1}, list of these, or "both"
-        With a record: whether positive (1) or negative (-1) recorded acceleration drives the block
-        downslope.
-    azimuth : float, array or DataArray
-        With a suite of pairs of components, of which it is needed: the direction of sliding,
-        degrees from the first component towards the second, 0 to 360.
-    yield_acceleration : float, array or DataArray, optional
-        Üy, m/s²; by default Coulomb's, g tan(φs − θ).
-    yield_coefficient : float, array or DataArray, optional
-        ky = Üy/g of Newmark's block, instead of `theta`, `mu_s` and `yield_acceleration`.
-    upslope_yield_acceleration : float, array or DataArray, optional
-        Üy,up of a block that slides both ways, m/s²; by default, by statics, g tan(arctan(Üy/g) +
-        2θ), with no sliding upslope where that angle reaches 90°.  Beside `yield_coefficient` it or
-        `theta` must be given.
-    decay_rate, delta_mu, minimum_friction : float, array or DataArray, optional
-        λ, Δμ and μmin where they are known; each replaces its estimate (Eqs. 6, 9-11), which under
-        a record every pulse has from its own peak.
-    residual_mu, residual_phi, weakening_distance : float, array or DataArray, optional
-        Of ``Newmark(strength="weakening")``: residual friction coefficient, or in its place the
-        angle (degrees), and the slip over which friction falls from `mu_s` to it, m.
-    fast_mu, rate_constant : float, array or DataArray, optional
-        Of ``Newmark(strength="rate")``: friction coefficient at high velocity, and how fast it is
-        approached, s/m.
-    structure_frequency : float, array or DataArray, optional
-        Natural frequency of the sliding structure, Hz, for the `flexible_block` flag; not with a
-        record.
     variables : sequence of str, optional
         Results to compute: `permanent_displacement`, `peak_relative_velocity`, `sliding_mode`,
         `validity` (these by default), `newmark_displacement` (of Newmark's block on the same cells,
@@ -171,7 +118,9 @@ def sweep(
     -------
     Dataset
         Dimensions theta, mu_s, amplitude, frequency, then others, `motion` last.  The parameters of
-        Eqs. 7-11 do not vary with frequency and have no such dimension.  A suite has its labels as
+        Eqs. 7-11 do not vary with frequency and have no such dimension.  With
+        `displacement_amplitude` the result has A as a coordinate, except if it and `frequency` span
+        a grid: there A is a result, for `variables`.  A suite has its labels as
         `motion`, and the file and the intensity measures of each motion, as it was recorded, as
         coordinates along it (``motion_pga`` and others: `slipsweep.motion.intensity`).
 
@@ -206,32 +155,7 @@ def sweep(
     array([[0.   , 0.   , 0.222],
            [0.   , 0.081, 0.445]])
     """
-    inputs = Inputs(
-        theta=theta,
-        mu_s=mu_s,
-        phi=phi,
-        amplitude=amplitude,
-        frequency=frequency,
-        displacement_amplitude=displacement_amplitude,
-        scale=scale,
-        pgv=pgv,
-        arias_intensity=arias_intensity,
-        time_scale=time_scale,
-        polarity=polarity,
-        azimuth=azimuth,
-        yield_acceleration=yield_acceleration,
-        yield_coefficient=yield_coefficient,
-        upslope_yield_acceleration=upslope_yield_acceleration,
-        decay_rate=decay_rate,
-        delta_mu=delta_mu,
-        minimum_friction=minimum_friction,
-        residual_mu=residual_mu,
-        residual_phi=residual_phi,
-        weakening_distance=weakening_distance,
-        fast_mu=fast_mu,
-        rate_constant=rate_constant,
-        structure_frequency=structure_frequency,
-    )
+    inputs = given_inputs(locals())
     plan = plan_sweep(
         inputs, excitation=excitation, model=model, solver=solver, variables=variables
     )
@@ -239,29 +163,22 @@ def sweep(
     return results.assign_coords(brought_coordinates(inputs, plan.coords, plan.names))
 
 
+@with_parameters
 def friction_parameters(
-    theta: Values,
+    theta: Values | None = None,
     mu_s: Values | None = None,
     amplitude: Values | None = None,
     *,
+    model: Model | str = "mendez",
     phi: Values | None = None,
     yield_acceleration: Values | None = None,
     decay_rate: Values | None = None,
     delta_mu: Values | None = None,
     minimum_friction: Values | None = None,
-    model: Model | str = "mendez",
 ) -> xr.Dataset:
     """Friction parameters of the model over a grid: those of Eqs. 7-11 of the paper, and λ.
 
     The paper is reference [1] of `sweep`.
-
-    Parameters
-    ----------
-    theta, mu_s, amplitude, phi, model
-        Inclination (degrees), static friction coefficient, peak ground acceleration (m/s²),
-        friction angle (degrees) and friction law, as in `sweep`.
-    yield_acceleration, decay_rate, delta_mu, minimum_friction : float, array or DataArray, optional
-        Those that are known, as in `sweep`; each replaces its estimate.
 
     Returns
     -------
@@ -293,16 +210,7 @@ def friction_parameters(
     >>> slipsweep.SlidingMode(results.sliding_mode.item()).name
     'STICK_SLIP'
     """
-    inputs = Inputs(
-        theta=theta,
-        mu_s=mu_s,
-        phi=phi,
-        amplitude=amplitude,
-        yield_acceleration=yield_acceleration,
-        decay_rate=decay_rate,
-        delta_mu=delta_mu,
-        minimum_friction=minimum_friction,
-    )
+    inputs = given_inputs(locals())
     plan = plan_friction_parameters(inputs, model=model)
     return plan.solve().assign_coords(brought_coordinates(inputs, plan.coords, plan.names))
 
@@ -313,7 +221,7 @@ def brought_coordinates(
     """Return the coordinates of DataArrays among the parameters, which must agree (InputError)."""
     brought: dict[Hashable, xr.Variable] = {}
     dims = {dim for variable in coords.values() for dim in variable.dims}
-    for parameter, array in inputs.given.items():
+    for parameter, array in inputs.items():
         if not isinstance(array, xr.DataArray):
             continue
         # levels of stacked coordinates come along; their tuples, which no file can hold, do not

@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError
 from slipsweep.grid import engine, plans, resources, solvers
 from slipsweep.grid import inputs as grid_inputs
-from slipsweep.kernels import step
+from slipsweep.kernels import step, step_cells
 from slipsweep.kernels.block import RESULTS
 from slipsweep.kernels.history import History
 from slipsweep.model import equations as eq
 from slipsweep.model import options, parameters, variables
+from slipsweep.model.docstrings import with_parameters
 from slipsweep.model.variables import HISTORY
 from slipsweep.motion import cutting
 from slipsweep.motion.paths import values_at
@@ -30,24 +31,18 @@ Floats = NDArray[np.float64]
 
 
 @datasets.naming_choices
+@with_parameters
 def simulate(
     theta: float | None = None,
     mu_s: float | None = None,
     amplitude: float | None = None,
     frequency: float | None = None,
     *,
-    phi: float | None = None,
     excitation: datasets.Excitation = "sine",
     model: options.Model | str = "mendez",
     solver: options.Solver | str = "auto",
-    times: Sequence[float] | np.ndarray | None = None,
-    points_per_cycle: int | None = None,
+    phi: float | None = None,
     displacement_amplitude: float | None = None,
-    scale: float | None = None,
-    pgv: float | None = None,
-    arias_intensity: float | None = None,
-    time_scale: float | None = None,
-    polarity: int | None = None,
     yield_acceleration: float | None = None,
     yield_coefficient: float | None = None,
     upslope_yield_acceleration: float | None = None,
@@ -60,15 +55,21 @@ def simulate(
     fast_mu: float | None = None,
     rate_constant: float | None = None,
     structure_frequency: float | None = None,
+    scale: float | None = None,
+    pgv: float | None = None,
+    arias_intensity: float | None = None,
+    time_scale: float | None = None,
+    polarity: int | None = None,
+    times: Sequence[float] | np.ndarray | None = None,
+    points_per_cycle: int | None = None,
 ) -> xr.Dataset:
     """Time history of one block: event by event, so that the samples are exact, or by steps.
 
+    Of a suite one motion is taken: ``excitation=suite["label"]``, of a pair
+    ``suite["label"].rotated(azimuth)``.
+
     Parameters
     ----------
-    theta, mu_s, amplitude, frequency : float
-        One case; these and the remaining parameters as in `slipsweep.sweep`, but that of a suite
-        one motion is taken: ``excitation=suite["label"]``, of a pair
-        ``suite["label"].rotated(azimuth)``.
     times : array, optional
         Times to sample, s, increasing, and not negative under a waveform; by default
         `points_per_cycle` a cycle, from 0 to the end of the shaking, or the times of a record's
@@ -109,31 +110,7 @@ def simulate(
     >>> print(f"{mm:.0f} mm after {history.time.values[-1]:.2f} s")
     331 mm after 2.78 s
     """
-    inputs = grid_inputs.Inputs(
-        theta=theta,
-        mu_s=mu_s,
-        phi=phi,
-        amplitude=amplitude,
-        frequency=frequency,
-        displacement_amplitude=displacement_amplitude,
-        scale=scale,
-        pgv=pgv,
-        arias_intensity=arias_intensity,
-        time_scale=time_scale,
-        polarity=polarity,
-        yield_acceleration=yield_acceleration,
-        yield_coefficient=yield_coefficient,
-        upslope_yield_acceleration=upslope_yield_acceleration,
-        decay_rate=decay_rate,
-        delta_mu=delta_mu,
-        minimum_friction=minimum_friction,
-        residual_mu=residual_mu,
-        residual_phi=residual_phi,
-        weakening_distance=weakening_distance,
-        fast_mu=fast_mu,
-        rate_constant=rate_constant,
-        structure_frequency=structure_frequency,
-    )
+    inputs = grid_inputs.given_inputs(locals())
     problem = grid_inputs.check_problem(excitation, model, solver)
     motion = problem.excitation
     if isinstance(motion, Suite):
@@ -212,7 +189,9 @@ class _History:
         """Return the steps that are taken, of dtype `step.LOG`."""
         polarity = 1.0 if self.record is None else float(self.inputs["polarity"])
         stepper = solvers.stepper_of(self.problem, self.options, polarity)
-        cells = np.full((1, len(step.STEP_CELL.names or ())), math.nan).view(step.STEP_CELL)[:, 0]
+        cells = np.full((1, len(step_cells.STEP_CELL.names or ())), math.nan).view(
+            step_cells.STEP_CELL
+        )[:, 0]
         for name, value in self.fields.items():
             cells[name] = value
         results = np.empty((len(RESULTS), 1))
@@ -226,7 +205,7 @@ class _History:
         """Fill in a history by steps."""
         log = self._logged()
         table[0] = self.fields["amplitude"] * values_at(self.path, phases)
-        table[1], table[3], table[4] = step.samples_of(log, phases, table[0])
+        table[1], table[3], table[4] = step_cells.samples_of(log, phases, table[0])
         table[2] = eq.mobilised_friction(
             table[0],
             table[1],

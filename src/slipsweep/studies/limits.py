@@ -22,9 +22,10 @@ from slipsweep.errors import InputError
 from slipsweep.grid import engine
 from slipsweep.grid.chunks import grid_chunks
 from slipsweep.grid.engine import Request, Variables
-from slipsweep.grid.inputs import Inputs, grid_sizes
+from slipsweep.grid.inputs import Inputs, given_inputs, grid_sizes
 from slipsweep.grid.plans import Plan, plan_sweep
 from slipsweep.model import options, parameters, units, variables
+from slipsweep.model.docstrings import with_parameters
 from slipsweep.model.variables import LimitStatus, Validity
 from slipsweep.motion.cutting import wave_of_record
 from slipsweep.motion.records import Record
@@ -58,18 +59,16 @@ _AFTER_SCAN = ("frequency", "time_scale", "structure_frequency", "displacement")
 
 
 @datasets.naming_choices
+@with_parameters
 def limit_amplitude(
     displacement: Values | str | Sequence[str],
     theta: Values | None = None,
     mu_s: Values | None = None,
     frequency: Values | None = None,
     *,
-    phi: Values | None = None,
     excitation: datasets.Excitation = "sine",
     model: options.Model | str = "mendez",
-    time_scale: Values | None = None,
-    polarity: datasets.Signs | None = None,
-    azimuth: Values | None = None,
+    phi: Values | None = None,
     yield_acceleration: Values | None = None,
     yield_coefficient: Values | None = None,
     upslope_yield_acceleration: Values | None = None,
@@ -82,6 +81,9 @@ def limit_amplitude(
     fast_mu: Values | None = None,
     rate_constant: Values | None = None,
     structure_frequency: Values | None = None,
+    time_scale: Values | None = None,
+    polarity: datasets.Signs | None = None,
+    azimuth: Values | None = None,
     maximum_amplitude: float | None = None,
     amplitude_steps: int = AMPLITUDE_STEPS,
     progress: Callable[[int], None] | None = None,
@@ -90,7 +92,7 @@ def limit_amplitude(
 
     The inverse of `sweep`, exact to the last bit: `sweep` with the cycle solver gives at least
     `displacement` at the amplitude returned, and less (or no value) at the double-precision number
-    before it.
+    before it.  The other parameters are those of `sweep`.
 
     The displacement u(A) need not grow with A, jumps where the sliding mode changes, and has gaps
     where the model gives no value (`validity`), so that a displacement may be reached at several
@@ -106,13 +108,12 @@ def limit_amplitude(
     ----------
     displacement : float, array or DataArray, str or list of str
         Tolerable permanent displacement, > 0, m or with a unit ("50mm").
-    theta, mu_s, frequency : float, array or DataArray
-        These and the remaining parameters as in `sweep`; the solver is "cycle".  A record has a
-        `time_scale` instead.
     maximum_amplitude : float, optional
         Where the search ends, m/s²; by default 5 g.
     amplitude_steps : int
         Steps of the scan, 2 or more.
+    progress : callable, optional
+        Called with the number of cells just finished, from any thread.
 
     Returns
     -------
@@ -146,27 +147,7 @@ def limit_amplitude(
     >>> limits.limit_amplitude.round(3).values
     array([3.34 , 3.756])
     """
-    inputs = Inputs(
-        theta=theta,
-        mu_s=mu_s,
-        phi=phi,
-        frequency=frequency,
-        time_scale=time_scale,
-        polarity=polarity,
-        azimuth=azimuth,
-        yield_acceleration=yield_acceleration,
-        yield_coefficient=yield_coefficient,
-        upslope_yield_acceleration=upslope_yield_acceleration,
-        decay_rate=decay_rate,
-        delta_mu=delta_mu,
-        minimum_friction=minimum_friction,
-        residual_mu=residual_mu,
-        residual_phi=residual_phi,
-        weakening_distance=weakening_distance,
-        fast_mu=fast_mu,
-        rate_constant=rate_constant,
-        structure_frequency=structure_frequency,
-    )
+    inputs = given_inputs(locals())
     plan = plan_limits(
         displacement,
         inputs,
@@ -198,9 +179,8 @@ def plan_limits(
     dims = target.dims
     values = target.values
     steps = parameters.check_whole("amplitude_steps", amplitude_steps, 2, 1_000_000)
-    # displacement and amplitude change places: in the layout of the grid it stands where the
-    # amplitude would
-    swapped = replace(inputs, amplitude=xr.Variable(dims, values))
+    # the displacement takes the place of the amplitude among the dimensions of the grid
+    swapped = {**inputs, "amplitude": xr.Variable(dims, values)}
     plan = plan_sweep(
         swapped, excitation=excitation, model=model, variables=["permanent_displacement"]
     )
@@ -218,7 +198,7 @@ def plan_limits(
     codes = variables.RECORD_COUNTS if "time_scale" in solved else ("sliding_mode",)
     extremes = variables.EXTREMES if options.slides_both_ways(request.problem.model) else ()
     names = (*variables.LIMIT_RESULTS, *extremes, *codes, "validity")
-    request = replace(request, inputs=solved, wanted=names)
+    request = replace(request, inputs=solved, names=names)
     return replace(
         plan,
         coords={name: variable for name, variable in plan.coords.items() if name != "amplitude"}
@@ -285,7 +265,7 @@ def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> dict[
     """Return the limit amplitudes of a part of a grid that one motion shakes."""
     scan = Scan(request, maximum_amplitude, steps)
     cell, low, high = _limits(scan)
-    names = tuple(name for name in request.wanted if not name.startswith("limit_"))
+    names = tuple(name for name in request.names if not name.startswith("limit_"))
     before = scan.solve(low, cell, names)
     after = scan.solve(high, cell, names)
     results = {name: variable.data.ravel() for name, variable in request.results().items()}
@@ -386,7 +366,7 @@ def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) 
     names = ("yield_acceleration", *limited)
     blocks["amplitude"] = xr.Variable((), 0.0)
     accelerations = engine.friction_parameters(Request(problem, sizes, blocks, names))
-    # a pulse begins to count, or changes its mode, where its own peak passes Üy or Üg,lim, which do
+    # a pulse begins to slide, or changes its mode, where its own peak passes Üy or Üg,lim; these do
     # not depend on A
     thresholds = np.stack([accelerations[name].values.ravel() for name in names], axis=1)
     yields = thresholds[:, :1]
@@ -463,13 +443,12 @@ def _hidden_peaks(scan: Scan, before: NDArray[np.bool_]) -> Iterator[Steps]:
 
     `before`, (cell, step), is True as long as the scan itself has not reached the target.
     """
-    # blocks that do not recouple: u jumps up each time that they come to rest one pulse earlier,
-    # and then falls
+    # if a block does not recouple, u jumps up where it comes to rest one pulse earlier, then falls
     saw, parts = (0.7, 128) if isinstance(scan.problem.excitation, Record) else (0.5, 512)
     moved = scan.displacements
     slides_on = scan.results["validity"] & Validity.NOT_RECOUPLED.value != 0
-    # the part of a target from which on a point may lie next to a peak, and a maximum of the scan
-    # to a higher one
+    # from this part of a target on, a point may lie next to a peak, or a maximum next to a higher
+    # one
     least = np.where(slides_on, saw, np.inf)
     peaks = (moved[:, 1:-1] > moved[:, :-2]) & (moved[:, 1:-1] > moved[:, 2:])
     least[:, 1:-1][peaks & ~slides_on[:, 1:-1]] = 0.9

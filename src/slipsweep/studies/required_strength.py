@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from slipsweep.grid import chunks, plans, resources, solvers
 from slipsweep.grid import inputs as grid_inputs
 from slipsweep.grid.engine import Request
 from slipsweep.model import options, parameters, variables
+from slipsweep.model.docstrings import with_parameters
 from slipsweep.model.variables import StrengthStatus
 from slipsweep.studies import datasets, limited_displacement
 from slipsweep.studies.datasets import Values
@@ -42,23 +42,24 @@ _DRAW = "draw of the uncertain inputs"
 
 
 @datasets.naming_choices
+@with_parameters
 def required_strength(
     displacement: Values | str | Sequence[str],
     amplitude: Values | None = None,
     frequency: Values | None = None,
     *,
     of: str = "yield_coefficient",
-    theta: Values | None = None,
     excitation: datasets.Excitation = "sine",
     model: options.Model | str = "newmark",
+    theta: Values | None = None,
     displacement_amplitude: Values | None = None,
+    upslope_yield_acceleration: Values | None = None,
     scale: Values | None = None,
     pgv: Values | None = None,
     arias_intensity: Values | None = None,
     time_scale: Values | None = None,
     polarity: datasets.Signs | None = None,
     azimuth: Values | None = None,
-    upslope_yield_acceleration: Values | None = None,
     uncertain: Mapping[str, Any] | None = None,
     samples: int = 4096,
     method: str = "sobol",
@@ -82,11 +83,9 @@ def required_strength(
     ----------
     displacement : float, array or DataArray, str or list of str
         Tolerable permanent displacement, > 0, m or with a unit ("50mm").
-    amplitude, frequency, theta : float, array or DataArray
-        These and the other parameters of the shaking as in `sweep`.  `theta` is needed for "mu_s"
-        and "phi", and of a block that slides both ways.
     of : {"yield_coefficient", "mu_s", "phi"}
         The strength to solve for: Üy/g, or the friction coefficient or angle of Coulomb's Üy.
+        `theta` is needed for "mu_s" and "phi", and for a block that slides both ways.
     model : Newmark or "newmark"
         The paper's law is refused: its displacement may grow with the friction coefficient.
     uncertain, samples, method, seed, correlation
@@ -134,19 +133,7 @@ def required_strength(
     >>> design.required_yield_coefficient_quantile.sel(quantile=0.84).values.round(3)
     array([0.089, 0.206])
     """
-    inputs = grid_inputs.Inputs(
-        theta=theta,
-        amplitude=amplitude,
-        frequency=frequency,
-        displacement_amplitude=displacement_amplitude,
-        scale=scale,
-        pgv=pgv,
-        arias_intensity=arias_intensity,
-        time_scale=time_scale,
-        polarity=polarity,
-        azimuth=azimuth,
-        upslope_yield_acceleration=upslope_yield_acceleration,
-    )
+    inputs = grid_inputs.given_inputs(locals())
     chosen = options.MODELS.of(model)
     sampling = None
     if uncertain is not None:
@@ -197,7 +184,7 @@ def plan_strength(
         )
     target = check_displacement(displacement)
     for name in _STRENGTHS:
-        if name in inputs.given:
+        if name in inputs:
             raise InputError(f"{name}: not allowed beside of = {of!r}: the strength is solved for")
     absolute = []
     if sampling is not None:
@@ -208,9 +195,9 @@ def plan_strength(
                     f"{sampling.key(name)}: not allowed beside of = {of!r}: only that strength may "
                     'be drawn, with kind = "factor" or "offset"'
                 )
-        check_drawn(sampling, (*inputs.given, of), problem)
+        check_drawn(sampling, (*inputs, of), problem)
         absolute = [name for name, entry in drawn.items() if entry.kind == "absolute"]
-    planned = replace(inputs, **{of: _ANY}, **dict.fromkeys(absolute, _ANY))
+    planned = {**inputs, of: _ANY, **dict.fromkeys(absolute, _ANY)}
     names = ["permanent_displacement"]
     plan = plans.plan_sweep(planned, excitation=excitation, model=model, variables=names)
     dropped = {of, "mu_s", *absolute}

@@ -63,8 +63,6 @@ class Distribution:
     """Distribution of an uncertain parameter: an entry of `uncertain`, called `key` in errors."""
 
     def __init__(self, key: str, parameter: str, entry: Any, g: float) -> None:
-        from scipy import stats
-
         entries = dict(entry) if isinstance(entry, Mapping) else {"distribution": entry}
         chosen = entries.pop("distribution", None)
         #: "absolute": a draw is the value; "factor": it multiplies the value of the grid point;
@@ -80,40 +78,15 @@ class Distribution:
                 f"that converts to {unit_of_parameter}"
             )
         #: A frozen distribution of scipy.stats, or anything else with a ``ppf``.
-        self.frozen = chosen
-        if isinstance(chosen, str):
-            family = getattr(stats, chosen, None)
-            if not isinstance(family, stats.rv_continuous):
-                raise InputError(
-                    f'{key}.distribution = "{chosen}": must be a continuous one of scipy.stats, '
-                    "such as norm, lognorm, "
-                    "uniform, triang, truncnorm, beta, gamma, weibull_min"
-                )
-            allowed = _arguments(family)
-            if not {*allowed[:-2]} <= {*entries} <= {*allowed}:
-                raise InputError(
-                    f"{key}: has {', '.join(map(str, entries)) or 'no parameters'}: {chosen} takes "
-                    f"{', '.join(allowed)}, of which loc and scale may be left out (and the keys "
-                    "kind and units)"
-                )
-            self.frozen = family(
-                **{name: check_finite(f"{key}.{name}", value) for name, value in entries.items()}
-            )
-        elif entries or not callable(getattr(chosen, "ppf", None)):
-            raise InputError(
-                f"{key}.distribution = {shown(chosen)}: must be the name of a distribution of "
-                "scipy.stats, with its parameters, or a frozen one without"
-            )
+        self.frozen = _frozen(key, chosen, entries)
         #: The distribution in words and numbers, as it was given.
         self.about: dict[str, Any] = {"distribution": repr(self.frozen)}
         if family := getattr(self.frozen, "dist", None):
             numbers = (
                 dict(zip(_arguments(family), self.frozen.args, strict=False)) | self.frozen.kwds
             )
-            self.about = {
-                "distribution": family.name,
-                **{name: float(value) for name, value in numbers.items()},
-            }
+            self.about = {"distribution": family.name}
+            self.about |= {name: float(value) for name, value in numbers.items()}
         with np.errstate(all="ignore"):
             median = parameters.check_numbers(f"{key}: its median", self.frozen.ppf(0.5))
         if median.ndim or not np.isfinite(median):
@@ -123,9 +96,9 @@ class Distribution:
             )
         #: Factor on draws, to have them in the parameter's own unit.
         self.unit = conversion(f"{key}.units", unit_of_parameter, units, g)
-        self.about |= (
-            {"units": units, "kind": self.kind} if units is not None else {"kind": self.kind}
-        )
+        if units is not None:
+            self.about["units"] = units
+        self.about["kind"] = self.kind
 
     def __str__(self) -> str:
         numbers = [
@@ -146,6 +119,34 @@ class Distribution:
             return draws
         with np.errstate(over="ignore"):
             return base * draws if self.kind == "factor" else base + draws
+
+
+def _frozen(key: str, chosen: Any, entries: Mapping[str, Any]) -> Any:
+    """Return a frozen distribution: the one of a name with its parameters, or `chosen` itself."""
+    from scipy import stats
+
+    if not isinstance(chosen, str):
+        if entries or not callable(getattr(chosen, "ppf", None)):
+            raise InputError(
+                f"{key}.distribution = {shown(chosen)}: must be the name of a distribution of "
+                "scipy.stats, with its parameters, or a frozen one without"
+            )
+        return chosen
+    family = getattr(stats, chosen, None)
+    if not isinstance(family, stats.rv_continuous):
+        raise InputError(
+            f'{key}.distribution = "{chosen}": must be a continuous one of scipy.stats, such as '
+            "norm, lognorm, uniform, triang, truncnorm, beta, gamma, weibull_min"
+        )
+    allowed = _arguments(family)
+    if not {*allowed[:-2]} <= {*entries} <= {*allowed}:
+        raise InputError(
+            f"{key}: has {', '.join(map(str, entries)) or 'no parameters'}: {chosen} takes "
+            f"{', '.join(allowed)}, of which loc and scale may be left out (and the keys kind and "
+            "units)"
+        )
+    numbers = {name: check_finite(f"{key}.{name}", value) for name, value in entries.items()}
+    return family(**numbers)
 
 
 class Sampling:

@@ -225,7 +225,7 @@ def limit_quantiles(limits: xr.Dataset) -> xr.Dataset:
     """
     dims = suite_dims(limits["limit_amplitude"])
     beyond = limits["limit_status"] == LimitStatus.NOT_REACHED
-    # so large that whatever is interpolated towards it is above all limits
+    # so large that a value interpolated towards it is above all limits
     values = limits["limit_amplitude"].where(~beyond, np.finfo(np.float64).max / 4.0)
     quantiles = _quantiles(values, np.array(QUANTILES), dims)
     quantile = quantiles.where(~(quantiles > values.where(~beyond).max()), np.inf).assign_attrs(
@@ -267,45 +267,64 @@ def summary_lines(result: xr.Dataset, displacement: Any = None, most: int = 100)
         statistics = suite_statistics(
             result, thresholds=0.0 if displacement is None else displacement
         )
-    symbol = "|u|" if has_signed_displacements(result.attrs) else "u"
+    columns = _labels_of_points(statistics, grid)
+    columns |= _values_of_points(statistics, points, with_chances=displacement is not None)
+    is_signed = has_signed_displacements(result.attrs)
+    name = "magnitude of the permanent displacement" if is_signed else "permanent displacement"
+    table = pd.DataFrame(columns).to_string(index=False)
+    return [f"{name} (mm) over {suite}:", *table.splitlines()]
+
+
+def _labels_of_points(
+    statistics: xr.Dataset, grid: Mapping[Hashable, int]
+) -> dict[str, Sequence[str]]:
+    """Return columns with the places of grid points, for each dimension that varies."""
     varying = [dim for dim, size in grid.items() if size > 1]
     # peak ground accelerations in g
     factors = {"amplitude": 1.0 / float(statistics.attrs.get("g", np.nan))}
     labels = itertools.product(
         *(labels_along(statistics, dim, factors.get(str(dim), 1.0)) for dim in varying)
     )
+    titles = {"amplitude": "PGA (g)", "yield_coefficient": "ky"}
     columns: dict[str, Sequence[str]] = {}
     for dim, texts in zip(varying, zip(*labels, strict=True), strict=True):
         units = statistics[dim].attrs.get("units", "1") if dim in statistics.variables else "1"
         title = str(dim) if units == "1" else f"{dim} ({units})"
-        columns[{"amplitude": "PGA (g)", "yield_coefficient": "ky"}.get(str(dim), title)] = texts
+        columns[titles.get(str(dim), title)] = texts
+    return columns
+
+
+def _values_of_points(
+    statistics: xr.Dataset, points: int, with_chances: bool
+) -> dict[str, Sequence[str]]:
+    """Return columns with the statistics of grid points, as texts.
+
+    Statistics of `sample` have P(u > d) always, those of a suite if `with_chances`.
+    """
     rows = {
         name: values.values.reshape(points, -1).T for name, values in statistics.data_vars.items()
     }
-
-    def show(title: str, column: np.ndarray, as_text: str) -> None:
-        columns[title] = ["none" if np.isnan(value) else format(value, as_text) for value in column]
-
-    for share, column in zip(
-        statistics["quantile"].values, rows["displacement_quantile"], strict=True
-    ):
-        show("median" if share == 0.5 else f"{100.0 * share:.3g} %", in_mm(column), ".3g")
+    columns: dict[str, Sequence[str]] = {}
+    shares = statistics["quantile"].values
+    for share, quantile in zip(shares, rows["displacement_quantile"], strict=True):
+        title = "median" if share == 0.5 else f"{100.0 * share:.3g} %"
+        columns[title] = _texts(in_mm(quantile), ".3g")
+    is_sampled = "zero_probability" not in rows
     if not is_sampled:
-        show("zero", rows["zero_probability"][0], ".1%")
-    if displacement is not None or is_sampled:
-        for d, column in zip(
-            statistics["threshold"].values, rows["exceedance_probability"], strict=True
-        ):
-            show(f"P({symbol} > {in_mm(d):.6g} mm)", column, ".1%")
+        columns["zero"] = _texts(rows["zero_probability"][0], ".1%")
+    if with_chances or is_sampled:
+        symbol = "|u|" if has_signed_displacements(statistics.attrs) else "u"
+        limits = statistics["threshold"].values
+        for limit, chance in zip(limits, rows["exceedance_probability"], strict=True):
+            columns[f"P({symbol} > {in_mm(limit):.6g} mm)"] = _texts(chance, ".1%")
     if (rows["valueless_share"] > 0.0).any():
-        show("no value", rows["valueless_share"][0], ".1%")
-    counts = (
-        "permanent displacement" if symbol == "u" else "magnitude of the permanent displacement"
-    )
-    return [
-        f"{counts} (mm) over {suite}:",
-        *pd.DataFrame(columns).to_string(index=False).splitlines(),
-    ]
+        columns["no value"] = _texts(rows["valueless_share"][0], ".1%")
+    return columns
+
+
+def _texts(values: np.ndarray, as_text: str) -> list[str]:
+    """Return numbers as texts, "none" for NaN."""
+    return ["none" if np.isnan(value) else format(value, as_text) for value in values]
 
 
 def at_thresholds(statistics: xr.Dataset, thresholds: Thresholds | None) -> xr.Dataset:

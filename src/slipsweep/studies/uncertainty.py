@@ -8,7 +8,6 @@ scale) they are solved once for all frequencies.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from slipsweep.errors import InputError
 from slipsweep.grid import chunks, engine, plans, resources, solvers, threads
 from slipsweep.grid import inputs as grid_inputs
 from slipsweep.model import options, parameters, variables
+from slipsweep.model.docstrings import with_parameters
 from slipsweep.motion.waveforms import Waveform
 from slipsweep.studies import datasets
 from slipsweep.studies.sampling import ENDS, SOBOL_MEMORY, Sampling, Thresholds, sobol_indices
@@ -59,32 +59,19 @@ _DRAW = "draw of the uncertain inputs"
 
 
 @datasets.naming_choices
+@with_parameters
 def sample(
     theta: datasets.Values | None = None,
     mu_s: datasets.Values | None = None,
     amplitude: datasets.Values | None = None,
     frequency: datasets.Values | None = None,
     *,
-    phi: datasets.Values | None = None,
     uncertain: Mapping[str, Any],
     excitation: datasets.Excitation = "sine",
     model: options.Model | str = "mendez",
     solver: options.Solver | str = "auto",
-    samples: int = 4096,
-    method: str = "sobol",
-    seed: int = 0,
-    quantiles: float | Sequence[float] | np.ndarray = (0.05, 0.5, 0.95),
-    thresholds: Thresholds = (0.01, 0.1, 1.0),
-    correlation: Sequence[tuple[str, str, float]] = (),
-    sensitivity: bool = False,
-    over: str | Sequence[str] = (),
+    phi: datasets.Values | None = None,
     displacement_amplitude: datasets.Values | None = None,
-    scale: datasets.Values | None = None,
-    pgv: datasets.Values | None = None,
-    arias_intensity: datasets.Values | None = None,
-    time_scale: datasets.Values | None = None,
-    polarity: datasets.Signs | None = None,
-    azimuth: datasets.Values | None = None,
     yield_acceleration: datasets.Values | None = None,
     yield_coefficient: datasets.Values | None = None,
     upslope_yield_acceleration: datasets.Values | None = None,
@@ -96,6 +83,20 @@ def sample(
     weakening_distance: datasets.Values | None = None,
     fast_mu: datasets.Values | None = None,
     rate_constant: datasets.Values | None = None,
+    scale: datasets.Values | None = None,
+    pgv: datasets.Values | None = None,
+    arias_intensity: datasets.Values | None = None,
+    time_scale: datasets.Values | None = None,
+    polarity: datasets.Signs | None = None,
+    azimuth: datasets.Values | None = None,
+    samples: int = 4096,
+    method: str = "sobol",
+    seed: int = 0,
+    quantiles: float | Sequence[float] | np.ndarray = (0.05, 0.5, 0.95),
+    thresholds: Thresholds = (0.01, 0.1, 1.0),
+    correlation: Sequence[tuple[str, str, float]] = (),
+    sensitivity: bool = False,
+    over: str | Sequence[str] = (),
     progress: Callable[[int], None] | None = None,
 ) -> xr.Dataset:
     """Quantiles and exceedance probabilities of the permanent displacement under uncertain inputs.
@@ -105,9 +106,6 @@ def sample(
 
     Parameters
     ----------
-    theta, mu_s, amplitude, frequency : float, array or DataArray
-        These and all parameters not named here as in `sweep`.  One drawn with ``kind="absolute"``
-        must not be given.
     uncertain : mapping of str to mapping or frozen distribution
         For any parameter but `polarity` and `azimuth` either a frozen distribution of scipy.stats,
         or a mapping with
@@ -116,7 +114,8 @@ def sample(
           whose shape parameters, ``loc`` and ``scale`` are further keys;
         - ``kind``: "absolute" (a draw is the value; by default), "factor" (it multiplies the value
           at the grid point or, for `yield_acceleration`, and without a record for `decay_rate`,
-          `delta_mu` and `minimum_friction`, the estimate) or "offset" (it is added to it);
+          `delta_mu` and `minimum_friction`, the estimate) or "offset" (it is added to it).  A
+          parameter that is drawn with "absolute" must not be given;
         - ``units``: of the draws, if not the parameter's own; not with factors.
     samples : int
         Samples a grid point; a power of 2 for Sobol's.
@@ -188,31 +187,7 @@ def sample(
     >>> result.displacement_quantile.sel(quantile=0.5).round(3).values
     array([0.   , 0.265])
     """
-    inputs = grid_inputs.Inputs(
-        theta=theta,
-        mu_s=mu_s,
-        phi=phi,
-        amplitude=amplitude,
-        frequency=frequency,
-        displacement_amplitude=displacement_amplitude,
-        scale=scale,
-        pgv=pgv,
-        arias_intensity=arias_intensity,
-        time_scale=time_scale,
-        polarity=polarity,
-        azimuth=azimuth,
-        yield_acceleration=yield_acceleration,
-        yield_coefficient=yield_coefficient,
-        upslope_yield_acceleration=upslope_yield_acceleration,
-        decay_rate=decay_rate,
-        delta_mu=delta_mu,
-        minimum_friction=minimum_friction,
-        residual_mu=residual_mu,
-        residual_phi=residual_phi,
-        weakening_distance=weakening_distance,
-        fast_mu=fast_mu,
-        rate_constant=rate_constant,
-    )
+    inputs = grid_inputs.given_inputs(locals())
     sampling = Sampling(
         uncertain,
         samples=samples,
@@ -235,11 +210,11 @@ def plan_samples(
 ) -> "SamplePlan":
     """Return the plan of the samples of a grid, drawn and checked; errors as of `sample`."""
     problem = grid_inputs.check_problem(excitation, model, solver)
-    check_drawn(sampling, tuple(inputs.given), problem)
+    check_drawn(sampling, tuple(inputs), problem)
     drawn = sampling.distributions
     absolute = [name for name, distribution in drawn.items() if distribution.kind == "absolute"]
     # 0.5: a value that every parameter may have
-    planned = replace(inputs, **dict.fromkeys(absolute, 0.5))
+    planned = {**inputs, **dict.fromkeys(absolute, 0.5)}
     names = ["permanent_displacement"]
     plan = plans.plan_sweep(
         planned, excitation=excitation, model=model, solver=solver, variables=names
@@ -250,7 +225,7 @@ def plan_samples(
         "displacement_amplitude" in plan.coords
         and {"displacement_amplitude", "frequency"} & dropped
     ):
-        dropped.add("amplitude")  # A = ω²d of no value is nobody's amplitude
+        dropped.add("amplitude")  # without values of d and f there is no A = ω²d
     coords = {name: variable for name, variable in plan.coords.items() if name not in dropped}
     sampling.check_draws(coords)
     about = options.friction_inputs(
@@ -545,11 +520,11 @@ class SamplePlan(plans.Plan):
             if angle in inputs:
                 inputs[name] = parameters.friction_coefficient(inputs.pop(angle))
         for name in (estimated for estimated in _ESTIMATED if estimated in drawn):
-            # Coulomb's yield acceleration depends on no shaking, which a record has of its own
+            # Coulomb's yield acceleration does not depend on the amplitude, which a record lacks
             every = {"amplitude": xr.Variable((), 0.0), **inputs}
             request = engine.Request(self.problem, grid_inputs.grid_sizes(every), every, (name,))
             estimate = engine.friction_parameters(request, finite=False)[name]
             values = self.sampling.distributions[name].applied(estimate, drawn[name])
-            # NaN leaves it to the estimate and its flag where that fails
+            # where the estimate fails, NaN lets the kernel estimate it and raise the flag
             inputs[name] = values.where(parameters.BOUNDS[name].holds(values))
         return inputs, sizes

@@ -1,7 +1,7 @@
-"""The exact kernel for a sine: cells whose motion is of the same kind are computed together, in SIMD batches.
+"""The exact kernel for a sine: cells whose motion is of the same kind are computed together, in SIMD.
 
 `solve` puts cells into batches (`batch`) by the kind of their motion (`kinds`), and solves one when
 it is full: pulses of stick-slip and of Newmark's block (`pulse`), continuous sliding
-(`continuous`).  A cell of no such kind, or whose iteration has not come to an end, is left to the
-kernel that solves any waveform. docs/numerics.md#batches-of-the-sine
+(`continuous`).  A cell of no such kind, or whose iteration has not converged, is solved by itself
+(`alone`).  docs/numerics.md#batches-of-the-sine
 """

@@ -20,57 +20,85 @@ from slipsweep.model.friction import exponential_derivatives
 #: Cells of a batch.  Its iterations end with that of the slowest cell.
 WIDTH = 32
 
+#: Cells that a batch has room for: those of a batch and those that wait for the next one.
+ROOM = 2 * WIDTH
+
 HALF_PI = 0.5 * math.pi
 
-#: Quantities of the cells of a batch, each (WIDTH,).
+#: The block of a cell (`kernels.block`), and ψ at which Üg = Üy.
+BLOCK = (
+    "amplitude",
+    "yield_acceleration",
+    "mu_s",
+    "tan_theta",
+    "delta_mu",
+    "decay_rate",
+    "yield_phase",
+)
+
+#: Quantities of the cells of a batch that is solved, each (WIDTH,).
+QUANTITIES = (
+    # what is computed before the motion: μmin, mode, and Eq. 4 at Üg = Üy and at the peak
+    "minimum_friction",
+    "sliding_mode",
+    "response_at_yield",
+    "response_at_peak",
+    # the search for an event: where it is, and 1 once the iteration has come to it
+    "event",
+    "converged",
+    # a part of the cycle, from ψ to ψ, and the gains of V and W on it
+    "start",
+    "end",
+    "gain",
+    "moment",
+    # a pulse: b from its beginning and from the peak on, V and W up to now, the largest V
+    "level",
+    "held",
+    "velocity",
+    "displacement",
+    "peak_velocity",
+    # pulses solved alone (`alone`): V at Üg = Üy and the least V of the rise, cycles that are left
+    # and W of those before; W and the cycles left when V was `seen_velocity`, when to look again
+    "entered",
+    "least_velocity",
+    "cycles_left",
+    "total",
+    "highest",
+    "seen_velocity",
+    "seen_total",
+    "seen_cycles_left",
+    "next_look",
+    "last_place",
+    # continuous sliding (`continuous`): gains of V over a quarter and over a cycle; the largest V
+    # of each half cycle that is entered with V = 0
+    "quarter",
+    "drift",
+    "highest_from_yield",
+    "highest_of_positive",
+    "highest_of_negative",
+    # 1 if all events have been located, and the flags of the motion
+    "solved",
+    "validity",
+)
+
+#: Most places between which E and D are monotone and D has one sign (`alone.find_places`).
+MOST_PLACES = 16
+
 BATCH = np.dtype(
     (
         np.record,
-        [
-            (name, np.float64, (WIDTH,))
-            for name in (
-                # the block (`kernels.block`), and ψ at which Üg = Üy
-                "amplitude",
-                "yield_acceleration",
-                "mu_s",
-                "tan_theta",
-                "delta_mu",
-                "decay_rate",
-                "yield_phase",
-                # known of a cell before its motion: μmin, mode, and Eq. 4 at Üg = Üy and at the
-                # peak
-                "minimum_friction",
-                "sliding_mode",
-                "response_at_yield",
-                "response_at_peak",
-                # the search for an event: where it is, and whether it has been found
-                "event",
-                "found",
-                # a part of the cycle, from ψ to ψ, and the gains of V and W on it
-                "start",
-                "end",
-                "gain",
-                "moment",
-                # a pulse: b from its beginning and from the peak on, V and W up to now, the largest
-                # V
-                "level",
-                "held",
-                "velocity",
-                "displacement",
-                "peak_velocity",
-                # continuous sliding (`continuous`)
-                "quarter",
-                "drift",
-                "missed",
-                "dip",
-                # whether all events have been found, and the flags of the motion
-                "solved",
-                "validity",
-            )
-        ]
-        # which cell of the results this is, and the kind of its motion (`kinds`); how many cells
-        # there are
-        + [("cell", np.int64, (WIDTH,)), ("kind", np.int64, (WIDTH,)), ("used", np.int64)],
+        [(name, np.float64, (ROOM,)) for name in BLOCK]
+        + [(name, np.float64, (WIDTH,)) for name in QUANTITIES]
+        # the number of the cell in the results, the kind of its motion (`kinds`), the number of
+        # cells; the places of each cell: Üg, ψ and E
+        + [
+            ("cell", np.int64, (ROOM,)),
+            ("kind", np.int64, (WIDTH,)),
+            ("used", np.int64),
+            ("places", np.float64, (WIDTH, MOST_PLACES)),
+            ("phases", np.float64, (WIDTH, MOST_PLACES)),
+            ("responses", np.float64, (WIDTH, MOST_PLACES)),
+        ],
     )
 )
 
@@ -89,14 +117,14 @@ NODES, WEIGHTS = (
 )
 MOST_E_FOLDINGS = 6.0
 
-#: An event is found when Newton's last step is smaller than this part of its value: 1e-14 is left.
-_TOLERANCE = 1e-7
-_MOST_STEPS = 32
+#: Newton's iteration has converged when its last step is smaller than this part of the value: 1e-14 is left.
+TOLERANCE = 1e-7
+MOST_STEPS = 32
 
 
 @inlined
 def load(cells: np.ndarray, first: int, batch: Batch) -> None:
-    """Fill a batch with cells, from the `first` on; fields of the block that have estimates are NaN where not given."""
+    """Fill a batch with cells, from the `first` on; NaN stands for "by default"."""
     batch.used = min(WIDTH, cells.size - first)
     for j in range(batch.used):
         batch.tan_theta[j] = cells[first + j].tan_theta
@@ -109,8 +137,8 @@ def load(cells: np.ndarray, first: int, batch: Batch) -> None:
 
 
 @inlined
-def given(batch: Batch, j: int) -> Cell:
-    """What is given of cell j of a batch."""
+def cell_of(batch: Batch, j: int) -> Cell:
+    """Return the parameters of cell j of a batch that has just been loaded."""
     return Cell(
         batch.tan_theta[j],
         batch.mu_s[j],
@@ -124,13 +152,13 @@ def given(batch: Batch, j: int) -> Cell:
 
 @inlined
 def friction(batch: Batch, j: int, x: float, g: float) -> float:
-    """μ(x), Eq. 6."""
+    """Return μ at Üg = x, Eq. 6."""
     return eq.friction_coefficient(x, batch.mu_s[j], batch.delta_mu[j], batch.decay_rate[j], g)
 
 
 @inlined
 def relative_acceleration(batch: Batch, j: int, x: float, g: float) -> tuple[float, float]:
-    """Eq. 4, E, as D(x) = x − E(x), and dD/dx (x ≠ 0, or a zero with the sign of its side)."""
+    """Return D and dD/dx, D(x) = x − E(x) of Eq. 4; a zero x has the sign of its side."""
     mu_s = batch.mu_s[j]
     tan_theta = batch.tan_theta[j]
     mu = friction(batch, j, x, g)
@@ -141,7 +169,9 @@ def relative_acceleration(batch: Batch, j: int, x: float, g: float) -> tuple[flo
 
 @inlined
 def held_gains(amplitude: float, held: float, start: float, end: float) -> tuple[float, float]:
-    """∫ (Üg − b) dψ and ∫ (end − ψ)(Üg − b) dψ from `start` to `end`: gains of V and W from rest with b held.
+    """Return the gains of V and W from rest with b held, from ψ to ψ.
+
+    These are ∫ (Üg − b) dψ and ∫ (end − ψ)(Üg − b) dψ, in closed form:
 
         Üg = A (1 − vers ψ)        S = ψ − sin ψ        H = ψ²/2 − vers ψ        |ψ| ≤ π/2
 
@@ -159,7 +189,9 @@ def held_gains(amplitude: float, held: float, start: float, end: float) -> tuple
 
 @scalar
 def integrate_eq4(batch: Batch, side: float, g: float) -> None:
-    """∫ D dψ and ∫ (end − ψ) D dψ from `start` to `end`, gains of V and W from rest by Eq. 4: fields `gain`, `moment`.
+    """Set `gain` and `moment` to the gains of V and W from rest by Eq. 4, from `start` to `end`.
+
+    These are ∫ D dψ and ∫ (end − ψ) D dψ, with
 
         |Üg| = A (1 − vers ψ)        D = ± n (μs − μ) − |Üg| tan² θ        ± is `side`
 
@@ -190,63 +222,23 @@ def integrate_eq4(batch: Batch, side: float, g: float) -> None:
 
 @scalar
 def find_eq4_event(batch: Batch, holds: float, side: float, g: float) -> None:
-    """The |Üg| at which D(±|Üg|) = 0, ± is `side`; or, if `holds` is 1, at which E(Üg) = b, `level`: field `event`.
+    """Set `event` to the |Üg| at which D = 0 on a side of Üg = 0; or E = b, `level`, if `holds` is 1.
 
-    Newton's iteration of all cells that have not `found` it, from `event` on.  It needs no bracket:
-    each begins on the side from which it cannot pass the root
+    Newton's iteration of all cells that have not `converged`, from `event` on.  It needs no
+    bracket: each begins on the side from which it cannot pass the root
     (docs/numerics.md#batches-of-the-sine).
     """
-    for _ in range(_MOST_STEPS):
+    for _ in range(MOST_STEPS):
         missing = 0
         for j in range(WIDTH):
             x = batch.event[j]
             rate, slope = relative_acceleration(batch, j, side * x, g)
             # E(x) − b = (x − b) − D
             step = (holds * (x - batch.level[j]) - rate) / (holds - side * slope)
-            there = batch.found[j] > 0.0
+            there = batch.converged[j] > 0.0
             batch.event[j] = x if there else x - step
-            there |= abs(step) <= _TOLERANCE * min(x, batch.amplitude[j] - x)
-            batch.found[j] = 1.0 if there else 0.0
-            missing += 0 if there else 1
-        if missing == 0:
-            break
-
-
-@inlined
-def gains_after_peak(amplitude: float, held: float, psi: float) -> tuple[float, float, float]:
-    """`held_gains` from the peak to 0 ≤ ψ ≤ 3π/2, and the rate of V there, Üg − b."""
-    beyond = psi > HALF_PI
-    # sin ψ = −sin χ and cos ψ = −cos χ for χ = ψ − π
-    near = psi - math.pi if beyond else psi
-    fallen = versine(near)
-    lag = angle_minus_sine(near)
-    swept = half_square_minus_versine(near)
-    if beyond:
-        swept = 0.5 * psi * psi - (2.0 - fallen)
-        fallen = 2.0 - fallen
-        lag = psi + (near - lag)
-    excess = amplitude - held
-    rate = excess - amplitude * fallen
-    return excess * psi - amplitude * lag, 0.5 * excess * psi * psi - amplitude * swept, rate
-
-
-@scalar
-def find_stop(batch: Batch, last: float) -> None:
-    """The ψ at which V, `velocity` at the peak, is used up with b `held` from there on: field `event`.
-
-    Newton's iteration of all cells that have not `found` it, from `event` on, beyond the stop, and
-    up to `last`.
-    """
-    for _ in range(_MOST_STEPS):
-        missing = 0
-        for j in range(WIDTH):
-            psi = batch.event[j]
-            gain, _, rate = gains_after_peak(batch.amplitude[j], batch.held[j], psi)
-            step = (batch.velocity[j] + gain) / rate
-            there = batch.found[j] > 0.0
-            batch.event[j] = psi if there else min(max(psi - step, 0.0), last)
-            there |= abs(step) <= _TOLERANCE * psi
-            batch.found[j] = 1.0 if there else 0.0
+            there |= abs(step) <= TOLERANCE * min(x, batch.amplitude[j] - x)
+            batch.converged[j] = 1.0 if there else 0.0
             missing += 0 if there else 1
         if missing == 0:
             break

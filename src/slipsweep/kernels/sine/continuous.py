@@ -1,7 +1,7 @@
 """Continuous sliding under a sine: Eq. 4 throughout, from integrals over one quarter of the cycle.
 
-|Üg| and the friction repeat every quarter, mirrored, so that a quarter gives a cycle, and the cycles an arithmetic
-series.  docs/numerics.md#continuous-sliding
+|Üg| and the friction repeat every quarter, mirrored, so that a quarter gives a cycle, and the cycles
+an arithmetic series.  docs/numerics.md#continuous-sliding
 """
 
 import math
@@ -33,9 +33,10 @@ _SERIES = np.array([np.sum(_WEIGHTED * _SINES**n) / math.factorial(n) for n in r
 
 @inlined
 def quarter_integrals(k: float) -> tuple[float, float]:
-    """∫ e^(−k sin φ) dφ and ∫ sin φ e^(−k sin φ) dφ over [0, π/2]; the latter is the derivative of the former by −k.
+    """Return ∫ e^(−k sin φ) dφ and ∫ sin φ e^(−k sin φ) dφ over [0, π/2].
 
-    In closed form π/2 (I₀ − L₀) and 1 + π/2 (L₁ − I₁), modified Bessel and Struve functions of k.
+    The second is the derivative of the first by −k.  In closed form they are π/2 (I₀ − L₀) and
+    1 + π/2 (L₁ − I₁), modified Bessel and Struve functions of k.
     """
     below = _CENTRE - k
     plain = 0.0
@@ -47,23 +48,18 @@ def quarter_integrals(k: float) -> tuple[float, float]:
 
 
 @scalar
-def slide_on(batch: Batch, options: Options) -> None:
-    """W of N cycles by Eq. 4 throughout.
+def slide_through_quarter(batch: Batch, g: float) -> None:
+    """Set the gains by Eq. 4 over a quarter (`quarter`), a cycle (`drift`), and up to Üg = Üy.
 
     Over a rising quarter of the cycle let q₀ = ∫ e^(−k sin φ) dφ, q₁ = ∫ sin φ e^(−k sin φ) dφ, k =
     λA/g, and
 
         G = g (μs π/2 − (μs + Δμ) q₀)        R = A tan θ (μs − tan θ − (μs + Δμ) q₁)
 
-    V gains G + R over a quarter of the positive half cycle (`quarter`), R − G over one of the
-    negative, and 4R over a cycle (`drift`).  Up to Üg = Üy, at ψy, the first cycle misses d₀ = ∫ D
-    dψ (`missed`) and d₁ = ∫ (ψy − ψ) D dψ:
-
-        W₁ = ψy d₀ − d₁ + (π/2)(2 (G + R) − d₀) + π (2 (G + R) − d₀ + (R − G))
-
-        W = W₁ + (N − 1) π (3 (G + R) + (R − G) − 2 d₀ + 4R N)
+    V gains G + R over a quarter of the positive half cycle, R − G over one of the negative, and 4R
+    over a cycle.  Up to Üg = Üy, at ψy, V gains d₀ = ∫ D dψ (`gain`), and W d₁ = ∫ (ψy − ψ) D dψ
+    (`moment`).
     """
-    g = options.g
     for j in range(WIDTH):
         amplitude = batch.amplitude[j]
         mu_s = batch.mu_s[j]
@@ -75,43 +71,26 @@ def slide_on(batch: Batch, options: Options) -> None:
         batch.drift[j] = 4.0 * drift
         batch.start[j] = -HALF_PI
         batch.end[j] = batch.yield_phase[j]
-        batch.level[j] = 0.0
-        batch.peak_velocity[j] = math.nan
         batch.validity[j] = 0.0
         batch.solved[j] = 1.0
     integrate_eq4(batch, 1.0, g)
-    later = options.cycles - 1.0
     for j in range(WIDTH):
-        missed = batch.gain[j]
-        drift = batch.drift[j]
-        up = batch.quarter[j]
-        yields = batch.yield_phase[j]
-        down = 0.5 * drift - up  # over a quarter of the negative half cycle
-        first = (
-            yields * missed
-            - batch.moment[j]
-            + HALF_PI * (2.0 * up - missed)
-            + math.pi * (2.0 * up - missed + down)
-        )
-        again = 3.0 * up + down - 2.0 * missed + drift * options.cycles
-        batch.displacement[j] = first + later * math.pi * again
-        batch.missed[j] = missed
+        batch.velocity[j] = batch.gain[j]
+        batch.displacement[j] = batch.moment[j]
 
 
 @scalar
-def find_peak_velocity(batch: Batch, options: Options) -> None:
-    """The largest V of all cycles: where D changes its sign, or at the end of a half cycle.
+def find_highest(batch: Batch, g: float) -> None:
+    """Set the largest V of each half cycle that is entered with V = 0 (`highest_of_…`).
 
-    D is ∓ g Δμ at Üg = 0.  On the rise of the positive half cycle it is concave (by
-    `kinds.classify`), on the negative one convex (as long as the block does not lift off): it
-    changes its sign once at most.  Where μ = μs it is −tan² θ |Üg|: before the zero on the positive
-    half, behind it on the negative one, from where Newton's iteration passes it once, and not
-    again.  Up to there V gains ∫ D dψ: the `dip` and the `bump`.  The fall mirrors the rise: D
-    changes its sign back when V has gained what it does in the half cycle, less the dip or the
-    bump.
+    V is largest where D changes its sign, or at an end of the half cycle.  D is ∓ g Δμ at Üg = 0.
+    On the rise of the positive half cycle it is concave (by `kinds.classify`), on the negative one
+    convex (as long as the block does not lift off): it changes its sign once at most, unless it has
+    its first sign again at the peak; such a cell is not solved.  Where μ = μs it is −tan² θ |Üg|:
+    before the zero on the positive half, behind it on the negative one, from where Newton's
+    iteration passes it once, and not again.  The fall mirrors the rise: D changes its sign back
+    when V has gained what it does in the half cycle, less what it had at the first change.
     """
-    cycles = options.cycles
-    g = options.g
     for side in (1.0, -1.0):
         for j in range(WIDTH):
             at_peak, slope = relative_acceleration(batch, j, side * batch.amplitude[j], g)
@@ -119,31 +98,59 @@ def find_peak_velocity(batch: Batch, options: Options) -> None:
             # one that has its first sign at the peak may have changed twice, unless it still goes
             # away from it
             batch.solved[j] = batch.solved[j] if turns | (slope >= 0.0) else 0.0
-            batch.found[j] = 0.0 if turns else 1.0
+            batch.converged[j] = 0.0 if turns else 1.0
             # μ = μs after ln(1 + r) e-foldings, r = Δμ/μs, nearly 2r/(2 + r)
             delta_mu = batch.delta_mu[j]
             at_static = (
                 2.0 * delta_mu * g / ((2.0 * batch.mu_s[j] + delta_mu) * batch.decay_rate[j])
             )
             batch.event[j] = at_static if turns else 0.0
-            batch.dip[j] = batch.gain[j]
         find_eq4_event(batch, 0.0, side, g)
         for j in range(WIDTH):
-            batch.solved[j] = min(batch.solved[j], batch.found[j])
+            batch.solved[j] = min(batch.solved[j], batch.converged[j])
             batch.end[j] = rising_phase(batch.event[j], batch.amplitude[j])
         integrate_eq4(batch, side, g)
+        for j in range(WIDTH):
+            turn = batch.gain[j]
+            positive = 2.0 * batch.quarter[j]
+            half = positive if side > 0.0 else batch.drift[j] - positive
+            highest = max(half, half - turn)
+            if side > 0.0:
+                batch.highest_from_yield[j] = highest
+                batch.highest_of_positive[j] = max(max(0.0, turn), highest)
+            else:
+                batch.highest_of_negative[j] = max(max(0.0, turn), highest)
+
+
+@scalar
+def slide_through_cycles(batch: Batch, options: Options) -> None:
+    """Set W, and the largest V, of N cycles by Eq. 4 throughout.
+
+    With G, R, d₀ and d₁ of `slide_through_quarter` the first cycle, up to Üg = Üy without d₀, and
+    all of them add
+
+        W₁ = ψy d₀ − d₁ + (π/2)(2 (G + R) − d₀) + π (2 (G + R) − d₀ + (R − G))
+
+        W = W₁ + (N − 1) π (3 (G + R) + (R − G) − 2 d₀ + 4R N)
+    """
+    later = options.cycles - 1.0
     for j in range(WIDTH):
-        dip = batch.dip[j]
-        bump = batch.gain[j]
-        missed = batch.missed[j]
+        missed = batch.velocity[j]
         drift = batch.drift[j]
-        half = 2.0 * batch.quarter[j]
-        other_half = drift - 2.0 * batch.quarter[j]
-        # of half cycles that are entered with V = 0, and the negative one with what the positive
-        # one has left
-        from_yield = max(half, half - dip)
-        positive = max(max(0.0, dip), from_yield)
-        negative = half + max(max(0.0, other_half), max(bump, other_half - bump))
-        peak = max(0.0, max(from_yield, negative) - missed)
-        last = drift - missed + max(positive, negative) + max(0.0, (cycles - 2.0) * drift)
-        batch.peak_velocity[j] = max(peak, last) if cycles > 1 else peak
+        up = batch.quarter[j]
+        down = 0.5 * drift - up  # over a quarter of the negative half cycle
+        from_yield = 2.0 * up - missed  # up to the end of the first half cycle
+        first = (
+            batch.yield_phase[j] * missed
+            - batch.displacement[j]
+            + HALF_PI * from_yield
+            + math.pi * (from_yield + down)
+        )
+        again = 3.0 * up + down - 2.0 * missed + drift * options.cycles
+        batch.displacement[j] = first + later * math.pi * again
+        # the negative half cycle is entered with what the positive one has left
+        negative = 2.0 * up + batch.highest_of_negative[j]
+        peak = max(0.0, max(batch.highest_from_yield[j], negative) - missed)
+        fastest = max(batch.highest_of_positive[j], negative)
+        last = drift - missed + fastest + max(0.0, (options.cycles - 2.0) * drift)
+        batch.peak_velocity[j] = max(peak, last) if options.cycles > 1 else peak

@@ -14,25 +14,24 @@ from slipsweep.kernels.sine.batch import (
     VALIDITY,
     WIDTH,
     Batch,
-    given,
+    cell_of,
     relative_acceleration,
 )
 from slipsweep.model import equations as eq
 from slipsweep.model.equations import CONTINUOUS, STICK_SLIP, STUCK
 
 #: Kinds of motion that batches are made of: from Üg = Üy to the peak b = Üy throughout (Newmark's
-#: block, too), or b = Üy and then Eq. 4, or at rest until Eq. 4 falls below Üg; and Eq. 4 all the
-#: time.
-YIELD_GOVERNS, FOLLOWS_EQ4, STICKS_AT_YIELD, SLIDES_ON = range(4)
-KINDS = 4
-#: No motion: stuck, without a value, or as Eq. 4 does not fall below Üg; and any other.
-RESTS = 4
-OTHER = 5
+#: block, too), or b = Üy and then Eq. 4, or at rest until Eq. 4 falls below Üg; Eq. 4 all the time;
+#: and all others of stick-slip and of continuous sliding, solved one by one (`alone`).
+YIELD_GOVERNS, FOLLOWS_EQ4, STICKS_AT_YIELD, SLIDES_ON, SLIPS_ALONE, SLIDES_ALONE = range(6)
+KINDS = 6
+#: No motion: stuck, without a value, or as Eq. 4 does not fall below Üg.
+RESTS = 6
 
 
 @inlined
 def pulse_kind(batch: Batch, j: int, g: float) -> int:
-    """The kind of stick-slip: conditions under which b is held up to one Üg at most and follows Eq. 4 beyond it."""
+    """Return the kind of stick-slip: that of a batch if b is held first and then follows Eq. 4."""
     tan_theta = batch.tan_theta[j]
     mu_s = batch.mu_s[j]
     decay_rate = batch.decay_rate[j]
@@ -56,9 +55,9 @@ def pulse_kind(batch: Batch, j: int, g: float) -> int:
     )
     smooth = (batch.response_at_peak[j] < end) & (convex | (rises & lags))
     gentle = decay_rate * end <= MOST_E_FOLDINGS * g
-    kind = (STICKS_AT_YIELD if sticks else FOLLOWS_EQ4) if gentle else OTHER
+    kind = (STICKS_AT_YIELD if sticks else FOLLOWS_EQ4) if gentle else SLIPS_ALONE
     kind = YIELD_GOVERNS if (not sticks) & (not follows) else kind
-    return kind if smooth else OTHER
+    return kind if smooth else SLIPS_ALONE
 
 
 @inlined
@@ -76,11 +75,14 @@ def stays_with_base(batch: Batch, j: int, g: float) -> bool:
 
 @scalar
 def classify(batch: Batch, first: int, options: Options, results: np.ndarray) -> None:
-    """The block of each cell of a batch and the kind of its motion; mode and a-priori validity go into the results."""
+    """Set the block of each cell of a batch and the kind of its motion.
+
+    The mode and the validity that is known before the motion go into the results.
+    """
     g = options.g
     slides = 0
     for j in range(WIDTH):
-        interface = interface_of(given(batch, j), options.rise, g)
+        interface = interface_of(cell_of(batch, j), options.rise, g)
         batch.yield_acceleration[j] = interface.yield_acceleration
         batch.delta_mu[j] = interface.delta_mu
         batch.minimum_friction[j] = interface.minimum_friction
@@ -95,7 +97,7 @@ def classify(batch: Batch, first: int, options: Options, results: np.ndarray) ->
         return
     for j in range(WIDTH):
         batch.decay_rate[j] = decay_rate_of(
-            given(batch, j), batch.delta_mu[j], batch.minimum_friction[j], g
+            cell_of(batch, j), batch.delta_mu[j], batch.minimum_friction[j], g
         )
         batch.yield_phase[j] = rising_phase(batch.yield_acceleration[j], batch.amplitude[j])
     if options.rise == NEWMARK:
@@ -109,10 +111,11 @@ def classify(batch: Batch, first: int, options: Options, results: np.ndarray) ->
         batch.response_at_peak[j] = end - relative_acceleration(batch, j, end, g)[0]
     for j in range(WIDTH):
         if batch.sliding_mode[j] == STICK_SLIP:
-            kind = pulse_kind(batch, j, g) if options.rise == MONOTONE else OTHER
+            kind = pulse_kind(batch, j, g) if options.rise == MONOTONE else SLIPS_ALONE
             batch.kind[j] = RESTS if stays_with_base(batch, j, g) else kind
         elif batch.sliding_mode[j] == CONTINUOUS:
             gentle = batch.decay_rate[j] * batch.amplitude[j] <= MOST_E_FOLDINGS * g
             # for the peak velocity D has to be concave (`continuous`)
             concave = batch.decay_rate[j] >= 2.0 * batch.tan_theta[j]
-            batch.kind[j] = SLIDES_ON if gentle & (concave | (not options.wants_peak)) else OTHER
+            together = gentle & (concave | (not options.wants_peak))
+            batch.kind[j] = SLIDES_ON if together else SLIDES_ALONE

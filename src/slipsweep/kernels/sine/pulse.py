@@ -5,16 +5,21 @@ Rules of the motion: docs/model.md.  ψ is the phase from the peak of the pulse.
 
 import math
 
-from slipsweep.jit.decorators import scalar
-from slipsweep.jit.elementary import angle_minus_sine, rising_phase
+from slipsweep.jit.decorators import inlined, scalar
+from slipsweep.jit.elementary import (
+    angle_minus_sine,
+    half_square_minus_versine,
+    rising_phase,
+    versine,
+)
 from slipsweep.kernels.block import INTEGRATE, NOT_RECOUPLED, Options
 from slipsweep.kernels.sine.batch import (
     HALF_PI,
+    MOST_STEPS,
+    TOLERANCE,
     WIDTH,
     Batch,
     find_eq4_event,
-    find_stop,
-    gains_after_peak,
     held_gains,
     integrate_eq4,
     relative_acceleration,
@@ -27,9 +32,49 @@ from slipsweep.model.friction import exponential_inflection
 _LEAST = 1e-150
 
 
+@inlined
+def gains_after_peak(amplitude: float, held: float, psi: float) -> tuple[float, float, float]:
+    """Return `held_gains` from the peak to 0 ≤ ψ ≤ 3π/2, and the rate of V there, Üg − b."""
+    beyond = psi > HALF_PI
+    # sin ψ = −sin χ and cos ψ = −cos χ for χ = ψ − π
+    near = psi - math.pi if beyond else psi
+    fallen = versine(near)
+    lag = angle_minus_sine(near)
+    swept = half_square_minus_versine(near)
+    if beyond:
+        swept = 0.5 * psi * psi - (2.0 - fallen)
+        fallen = 2.0 - fallen
+        lag = psi + (near - lag)
+    excess = amplitude - held
+    rate = excess - amplitude * fallen
+    return excess * psi - amplitude * lag, 0.5 * excess * psi * psi - amplitude * swept, rate
+
+
+@scalar
+def find_stop(batch: Batch, last: float) -> None:
+    """Set `event` to the ψ of the stop, with `velocity` at the peak and b `held` from there on.
+
+    Newton's iteration of all cells that have not `converged`, from `event` on, which is beyond the
+    stop, and up to `last`.
+    """
+    for _ in range(MOST_STEPS):
+        missing = 0
+        for j in range(WIDTH):
+            psi = batch.event[j]
+            gain, _, rate = gains_after_peak(batch.amplitude[j], batch.held[j], psi)
+            step = (batch.velocity[j] + gain) / rate
+            there = batch.converged[j] > 0.0
+            batch.event[j] = psi if there else min(max(psi - step, 0.0), last)
+            there |= abs(step) <= TOLERANCE * psi
+            batch.converged[j] = 1.0 if there else 0.0
+            missing += 0 if there else 1
+        if missing == 0:
+            break
+
+
 @scalar
 def begin_to_slide(batch: Batch, kind: int, g: float) -> None:
-    """t1: the ψ at which a cell begins to slide (`start`) and the b that it then holds (`level`).
+    """Set `start` to the ψ at which a cell begins to slide (t1), and `level` to b there.
 
     Üg = Üy, or where the block sticks there the Üg at which E has come down to it, D = 0.
     docs/numerics.md#onset-and-switch
@@ -47,17 +92,17 @@ def begin_to_slide(batch: Batch, kind: int, g: float) -> None:
         decay_rate = max(batch.decay_rate[j], _LEAST)
         bend = exponential_inflection(tan_theta, decay_rate, g)
         batch.event[j] = min(max(bend, batch.yield_acceleration[j]), batch.amplitude[j])
-        batch.found[j] = 0.0
+        batch.converged[j] = 0.0
     find_eq4_event(batch, 0.0, 1.0, g)
     for j in range(WIDTH):
-        batch.solved[j] = batch.found[j]
+        batch.solved[j] = batch.converged[j]
         batch.level[j] = batch.event[j]
         batch.start[j] = rising_phase(batch.event[j], batch.amplitude[j])
 
 
 @scalar
 def rise(batch: Batch, kind: int, g: float) -> None:
-    """From t1 to the peak, b = max(b, E): V and W gained, and Ümax = b at the peak (`held`).
+    """Slide from t1 to the peak with b = max(b, E), which is `held` from there on.
 
     b is held up to E = b, the switch, and follows Eq. 4 beyond it.
     docs/numerics.md#onset-and-switch
@@ -67,6 +112,7 @@ def rise(batch: Batch, kind: int, g: float) -> None:
             batch.held[j] = batch.level[j]
             gained = held_gains(batch.amplitude[j], batch.level[j], batch.start[j], 0.0)
             batch.velocity[j], batch.displacement[j] = gained
+            batch.solved[j] = 1.0 if batch.velocity[j] > 0.0 else 0.0
         return
     for j in range(WIDTH):
         amplitude = batch.amplitude[j]
@@ -76,10 +122,10 @@ def rise(batch: Batch, kind: int, g: float) -> None:
         follows = excess > 0.0
         batch.held[j] = amplitude - rate if follows else level
         batch.event[j] = amplitude - excess / (1.0 - slope) if follows else amplitude
-        batch.found[j] = 0.0 if follows else 1.0
+        batch.converged[j] = 0.0 if follows else 1.0
     find_eq4_event(batch, 1.0, 1.0, g)
     for j in range(WIDTH):
-        batch.solved[j] = min(batch.solved[j], batch.found[j])
+        batch.solved[j] = min(batch.solved[j], batch.converged[j])
         # not before the start, from which it may differ by the rounding of two roots
         switch = max(rising_phase(batch.event[j], batch.amplitude[j]), batch.start[j])
         gained = held_gains(batch.amplitude[j], batch.level[j], batch.start[j], switch)
@@ -90,11 +136,14 @@ def rise(batch: Batch, kind: int, g: float) -> None:
     for j in range(WIDTH):
         batch.displacement[j] += batch.moment[j] - batch.velocity[j] * batch.start[j]
         batch.velocity[j] += batch.gain[j]
+        batch.solved[j] = batch.solved[j] if batch.velocity[j] > 0.0 else 0.0
 
 
 @scalar
 def fall(batch: Batch, options: Options) -> None:
-    """b held from the peak to the stop; with Eq. 12 no further than to t5, Üg = 0, where `velocity` is then V.
+    """Slide with b held from the peak to the stop; by Eq. 12 no further than to t5, Üg = 0.
+
+    `velocity` is then V at t5.  A block with V = 0 at the peak is at rest.
 
     V at t5 is V + A − b π/2.  V is largest, V₀, at Üg = b, ψ₀, and below the parabola V₀ − ½ A sin
     ψ₀ (ψ − ψ₀)² from there up to t5.  Beyond t5, χ = ψ − π/2, it is V − b χ − A vers χ, and vers χ
@@ -104,13 +153,15 @@ def fall(batch: Batch, options: Options) -> None:
     eq12 = options.recoupling != INTEGRATE
     missing = 0
     for j in range(WIDTH):
+        rests = batch.velocity[j] == 0.0
         at_t5 = batch.velocity[j] + batch.amplitude[j] - HALF_PI * batch.held[j]
-        found = eq12 & (at_t5 > 0.0)
+        at_t5 = 0.0 if rests else at_t5
+        converged = (eq12 & (at_t5 > 0.0)) | rests
         batch.gain[j] = at_t5
-        batch.event[j] = HALF_PI
-        batch.found[j] = 1.0 if found else 0.0
-        batch.peak_velocity[j] = math.nan
-        missing += 0 if found else 1
+        batch.event[j] = 0.0 if rests else HALF_PI
+        batch.converged[j] = 1.0 if converged else 0.0
+        batch.peak_velocity[j] = 0.0
+        missing += 0 if converged else 1
     if options.wants_peak or missing > 0:
         for j in range(WIDTH):
             amplitude = batch.amplitude[j]
@@ -126,13 +177,15 @@ def fall(batch: Batch, options: Options) -> None:
                 2.0 * longest / (1.0 + math.sqrt(1.0 + 2.0 * curvature * longest)), math.pi
             )
             beyond = HALF_PI if eq12 else after_t5
-            batch.event[j] = beyond if at_t5 > 0.0 else before_t5
-            batch.peak_velocity[j] = peak if options.wants_peak else math.nan
+            stop = beyond if at_t5 > 0.0 else before_t5
+            rests = batch.velocity[j] == 0.0
+            batch.event[j] = 0.0 if rests else stop
+            batch.peak_velocity[j] = 0.0 if rests else peak
     if missing > 0:
         find_stop(batch, HALF_PI if eq12 else 3.0 * HALF_PI)
     for j in range(WIDTH):
         stop = batch.event[j]
-        batch.solved[j] = min(batch.solved[j], batch.found[j])
+        batch.solved[j] = min(batch.solved[j], batch.converged[j])
         gained = gains_after_peak(batch.amplitude[j], batch.held[j], stop)[1]
         batch.displacement[j] += batch.velocity[j] * stop + gained
         batch.velocity[j] = max(batch.gain[j], 0.0) if eq12 else 0.0
@@ -140,7 +193,7 @@ def fall(batch: Batch, options: Options) -> None:
 
 @scalar
 def repeat(batch: Batch, kind: int, options: Options) -> None:
-    """Eq. 12 from t5 on, and all cycles: W, and the largest V.
+    """Slide on by Eq. 12 from t5, and through all cycles: `displacement` and `peak_velocity`.
 
     By integration the block is at rest within the cycle, and all are alike.  For Eq. 12 let L be V
     and M be W at t5, v₁ what is left of L at the next Üg = Üy, h the phase from Üg = Üy to t5, and
@@ -149,8 +202,8 @@ def repeat(batch: Batch, kind: int, options: Options) -> None:
 
         W = (N − 1)(W₀ + π v₁ (N − 2)) + M + (N − 1) v₁ h + (L + (N − 1) v₁)²/(2b)
 
-    A block that sticks at Üg = Üy when at rest does not when it moves: such a cell is left to the
-    general kernel. docs/numerics.md#batches-of-the-sine
+    A block that sticks at Üg = Üy when at rest does not when it moves: such a cell is not solved
+    (`alone` solves it). docs/numerics.md#batches-of-the-sine
     """
     if options.recoupling == INTEGRATE:
         for j in range(WIDTH):

@@ -24,8 +24,8 @@ from slipsweep.studies.calibration.observation import Observation
 #: Combinations of errors with a smaller effect, in standard deviations, are left out.
 _NO_EFFECT = 0.01
 
-#: Standard deviations by which the sum of squares of errors of the table's motion exceeds what is
-#: expected where they are taken to be larger, and how many times as large they may be.
+#: Errors of the table's motion are multiplied if their sum of squares exceeds the expected one by
+#: more than so many standard deviations; and factors that are tried.
 _WIDER = 3.0
 _TIMES = np.geomspace(1.0, 20.0, 100)
 
@@ -286,7 +286,7 @@ class Likelihood:
         of_table = effects[:, :number] - of_sensors @ (of_sensors.T @ effects[:, :number])
         left, sizes, _ = np.linalg.svd(of_table, full_matrices=False)
         squares = (left.T @ rest) ** 2
-        # as first estimated, with noise that had not settled, they may be too large
+        # they may be too large if they were first estimated before the noise had settled
         factors = _TIMES / observation.table_factor
         variances = 1.0 + np.outer(factors**2, sizes**2)
         factor = factors[np.argmin(np.sum(np.log(variances) + squares / variances, axis=1))]

@@ -38,22 +38,25 @@ QUANTILE = 1.959964
 #: Types of a test.
 Test = str | Path | ShakingTest | xr.Dataset | Mapping[str, xr.DataArray]
 
-#: The threshold of a slide: standard deviations of the noise of r, of which one sample in 16 000
-#: exceeds 4 by chance, and at least a part of the table's largest acceleration, by which two
-#: sensors may disagree.
+#: Threshold of a slide in standard deviations of the noise of r; one sample in 16 000 exceeds it by
+#: chance.
 NOISE_IN_THRESHOLD = 4.0
+
+#: Least threshold in parts of the table's largest acceleration: two sensors may differ by this.
 LEAST_THRESHOLD = 0.005
 
-#: Samples in turn that begin a slide by exceeding the threshold; that end one by staying below it
-#: while the integral of r is back at zero; and that end one whatever the integral, which a sensor
-#: with an offset falsifies.
+#: A slide begins where so many samples in turn exceed the threshold.
 _BEGINS = 2
+
+#: It ends where so many samples in turn stay below it and the integral of r is back at zero, or so
+#: many whatever the integral is (an offset of a sensor makes it wrong).
 _ENDS = 4
 _ENDS_ANYWAY = 20
 
-#: Samples at either end of a slide that are not taken for its friction, and those that show how it
-#: begins.
+#: Samples at either end of a slide that do not count for its friction.
 _AT_ENDS = 3
+
+#: Samples that show the onset of a slide.
 _FIRST = 6
 
 #: Friction is level if it scatters by this part of itself at most beyond the noise, and Eq. 1 falls
@@ -62,11 +65,11 @@ _LEVEL = 0.05
 _LOW_SHARE = 0.05
 _LOW = 0.8
 
-#: Constant friction of so many times the static coefficient given is that of a channel in a wrong
-#: unit, or reversed.
+#: Constant friction of more than so many times the static coefficient is doubted: a channel may
+#: have a wrong unit or sign.
 _TOO_MUCH = 1.25
 
-#: Attributes by which results are known as ours.
+#: Attributes of results: the program and the paper.
 SOURCE = {"source": f"slipsweep {__version__}", "references": REFERENCE}
 
 #: The ends of intervals of results.
@@ -82,8 +85,8 @@ def noise_of(values: Floats) -> float:
 
     It is that of third differences by their median, which few large values do not change.
     """
-    # those of white noise have 20 times its variance; those of a motion that the sampling resolves
-    # are small
+    # third differences of white noise have 20 times its variance; those of a motion that is sampled
+    # densely are small
     differences = np.diff(values[np.isfinite(values)], 3) / 20.0**0.5
     return float(1.4826 * np.median(np.abs(differences))) if differences.size else 0.0
 
@@ -124,8 +127,7 @@ def slides_of(times: Floats, table: Floats, block: Floats, threshold: float) -> 
         ):
             onset -= 1
         signed = cumulative_trapezoid(relative[onset:], times[onset:], initial=0.0)
-        # at rest r is zero and stays so, and the velocity is back at zero, but for what the noise
-        # adds up to
+        # at rest r stays zero, and the velocity is back at zero, but for the integral of the noise
         noise = threshold * (times[min(onset + 1, times.size - 1)] - times[onset])
         slow = np.abs(signed) <= 0.1 * np.maximum.accumulate(np.abs(signed)) + noise
         turned = (
@@ -153,7 +155,7 @@ def onset_acceleration(table: Floats, block: Floats, slide: slice, threshold: fl
     if rising.size < 3:
         return float(table[slide.start])
     start = np.polynomial.Polynomial.fit(relative[rising], table[rising], 1)(0.0)
-    # r need not grow in a straight line: no further back than the samples before
+    # r may not grow in a straight line: the onset is no earlier than two samples before
     return float(np.clip(start, *sorted((table[max(slide.start - 2, 0)], table[rising[0]]))))
 
 
@@ -176,70 +178,80 @@ def coefficients_of(
 ) -> xr.Dataset:
     """Return static and kinetic friction by statics, with 95 % intervals.
 
-    They are those of the slides that begin downslope.
-
-    The attribute `constant_friction` is a sentence if friction is level while the block slides,
-    where Eq. 1 falls.
+    They are those of the slides that begin downslope.  The attribute `constant_friction` is a
+    sentence if friction is level while the block slides, where Eq. 1 falls.
     """
     threshold = threshold_of(table, block)[0]
-    relative = table - block
     eq1 = eq1_friction(table, block, theta, mu_s, g)
     free = free_body_friction(block, theta, g)
     inside = []
-    begins = []
+    onsets = []
     for slide in slides:
         part = slice(slide.start + _AT_ENDS, (slide.stop or table.size) - _AT_ENDS)
-        downslope = np.nanmean(relative[slide.start : slide.start + _AT_ENDS]) > 0.0
-        if np.isfinite(free[part]).sum() < 3 or not downslope:
-            continue
-        inside.append(np.column_stack([free[part], eq1[part]]))
-        first = slide.start + int(np.argmax(relative[slide] > threshold))
-        begin = np.nanmean(block[first : first + _FIRST])
-        before = table[max(first - 1, 0)]
-        after = table[first]
-        jumps = (
-            before - begin > threshold
-        )  # else it would have been seen to slide at the sample before
-        begins.append((0.5 * (before + after), 0.5 * (after - before)) if jumps else (begin, 0.0))
+        first = slice(slide.start, slide.start + _AT_ENDS)
+        is_downslope = np.nanmean((table - block)[first]) > 0.0
+        if is_downslope and np.isfinite(free[part]).sum() >= 3:
+            inside.append(np.column_stack([free[part], eq1[part]]))
+            onsets.append(_block_at_onset(table, block, slide, threshold))
     static = kinetic = np.full(3, np.nan)
-    constant = False
+    is_constant = False
     if inside:
-        slope = (
-            1.0 / g / np.cos(np.radians(theta)) ** 2
-        )  # of friction by the block's acceleration, near enough
+        # slope of the friction over the block's acceleration, near enough
+        slope = 1.0 / g / np.cos(np.radians(theta)) ** 2
         noise = noise_of(block) * slope
-        every = np.concatenate(inside)
-        levels = np.array([np.nanmean(samples[:, 0]) for samples in inside])
-        (starts, between) = np.array(begins).T
-        kinetic = _mean(levels, noise / (every.shape[0] / len(levels)) ** 0.5, 0.0)
-        static = _mean(free_body_friction(starts, theta, g), noise, float(np.mean(between)) * slope)
-        scatter = float(np.nanmean((every[:, 0] - kinetic[1]) ** 2)) - noise**2
-        level = kinetic[1] > 0.0 and max(scatter, 0.0) ** 0.5 < _LEVEL * kinetic[1]
-        constant = level and float(np.nanquantile(every[:, 1], _LOW_SHARE)) < _LOW * mu_s
+        samples = np.concatenate(inside)
+        levels = np.array([np.nanmean(of_slide[:, 0]) for of_slide in inside])
+        noise_of_level = noise / (samples.shape[0] / len(levels)) ** 0.5
+        kinetic = mean_with_interval(levels, noise_of_level, 0.0)
+        starts, errors = np.array(onsets).T
+        systematic = float(np.mean(errors)) * slope
+        static = mean_with_interval(free_body_friction(starts, theta, g), noise, systematic)
+        scatter = float(np.nanmean((samples[:, 0] - kinetic[1]) ** 2)) - noise**2
+        is_level = kinetic[1] > 0.0 and max(scatter, 0.0) ** 0.5 < _LEVEL * kinetic[1]
+        is_constant = is_level and float(np.nanquantile(samples[:, 1], _LOW_SHARE)) < _LOW * mu_s
     coefficients = {}
     for kind, (low, value, high) in (("static", static), ("kinetic", kinetic)):
         name = f"{kind} friction coefficient by statics"
-        about, of_interval = (
-            {"units": "1", "long_name": text} for text in (name, f"95 % interval of the {name}")
-        )
+        about = {"units": "1", "long_name": name}
+        of_interval = {"units": "1", "long_name": f"95 % interval of the {name}"}
+        interval = xr.Variable(("bound",), [low, high], of_interval)
         coefficients[f"{kind}_friction"] = xr.Variable((), value, about)
-        coefficients[f"{kind}_friction_interval"] = xr.Variable(
-            ("bound",), [low, high], of_interval
-        )
-    sentence = (
-        f"This is a block of constant friction: by statics {kinetic[1]:.3g} while it slides, "
-        "though Eq. 1 falls. Newmark's model is the right one for it."
-    )
-    if max(static[1], kinetic[1]) > _TOO_MUCH * mu_s:
-        sentence = (
-            f"By statics friction is {static[1]:.3g} where a slide begins and {kinetic[1]:.3g} in "
-            f"it, more than mu_s = {mu_s:.3g}: are signs and units of all channels, theta and mu_s "
+        coefficients[f"{kind}_friction_interval"] = interval
+    sentence = _constant_friction_text(static[1], kinetic[1], mu_s) if is_constant else ""
+    return xr.Dataset(coefficients, attrs={"constant_friction": sentence})
+
+
+def _block_at_onset(
+    table: Floats, block: Floats, slide: slice, threshold: float
+) -> tuple[float, float]:
+    """Return the block's acceleration at the onset of a slide, and its error, m/s².
+
+    If the block's acceleration jumps at the onset, the onset lies between two samples of the table.
+    """
+    first = slide.start + int(np.argmax((table - block)[slide] > threshold))
+    after_onset = float(np.nanmean(block[first : first + _FIRST]))
+    before = float(table[max(first - 1, 0)])
+    after = float(table[first])
+    # without a jump the block would slide at the sample before, too
+    jumps = before - after_onset > threshold
+    return (0.5 * (before + after), 0.5 * (after - before)) if jumps else (after_onset, 0.0)
+
+
+def _constant_friction_text(static: float, kinetic: float, mu_s: float) -> str:
+    """Return the sentence on constant friction; friction far above μs is doubted."""
+    if max(static, kinetic) > _TOO_MUCH * mu_s:
+        return (
+            f"By statics friction is {static:.3g} where a slide begins and {kinetic:.3g} in it, "
+            f"more than mu_s = {mu_s:.3g}: are signs and units of all channels, theta and mu_s "
             "right?"
         )
-    return xr.Dataset(coefficients, attrs={"constant_friction": sentence if constant else ""})
+    return (
+        f"This is a block of constant friction: by statics {kinetic:.3g} while it slides, though "
+        "Eq. 1 falls. Newmark's model is the right one for it."
+    )
 
 
-def _mean(values: Floats, noise: float, systematic: float) -> Floats:
+def mean_with_interval(values: Floats, noise: float, systematic: float) -> Floats:
     """Return the mean of a value for each slide, between the ends of its 95 % interval.
 
     The interval has the scatter of the values or their noise, whichever is larger, and a systematic

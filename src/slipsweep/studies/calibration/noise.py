@@ -20,30 +20,36 @@ LEAST_NOISE = 1e-4
 #: Standard deviation of normal noise over the median of its absolute values.
 OF_MEDIAN = 1.4826
 
-#: Correlations of neighbouring samples of the noise that are tried; by how much −2 ln of the
-#: likelihood falls at least if noise is coloured; variances of the noise that are tried; standard
-#: errors up to which a correlation may be chance.
+#: Correlations of neighbouring samples of the noise that are tried.
 COLOURS = (0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.93, 0.95, 0.98)
+
+#: Noise is coloured if −2 ln of the likelihood is lower by at least this than for white noise.
 NO_CHANCE = 8.0
+
+#: Variances of the noise that are tried.
 _VARIANCES = np.geomspace(0.01, 100.0, 81)
+
+#: Innovations are independent if no correlation up to this distance, in samples, is larger than so
+#: many standard errors.
+_LAGS = 10
 _CHANCE = 4.0
 
-#: Distances in samples at which residuals are looked at, and the standard deviation of normal noise
-#: over that by its median, at most.
-_LAGS = 10
+#: They are normal if their standard deviation is at most so many times that by the median.
 _TAILS = 1.25
 
-#: A flat top has so many equal values in turn at least, and so many in all.
+#: A flat top has at least so many equal values in turn, and so many in all.
 _IN_TURN = 3
 _FLAT = 4
 
-#: Steps of a converter, and standard deviations of the noise, within which a crest that is only
-#: rounded has several times as many values as are equal to the largest, and a clipped one few.
+#: Height of the band below the largest value in which a crest that is not clipped has several times
+#: as many samples as at the largest value: in steps of the converter, and in standard deviations of
+#: the noise; the larger counts.
 _STEPS = 24.0
 _NOISES = 1.5
 
-#: Noise on a flat top: standard deviations of it from the largest value to the foot of the top, and
-#: further down; how many times as many samples lie in the top as below it, and how many at least.
+#: A top is flat under noise if so many times as many samples lie within the first distance from the
+#: largest value as between it and the second (in standard deviations of the noise), and at least so
+#: many.
 _TOP = 5.0
 _BELOW = 13.0
 _CROWDED = 2.5

@@ -34,16 +34,18 @@ Forward = Callable[[Floats, Floats], Mapping[str, Floats]]
 #: Parameters that are estimated, in the order of all vectors.
 SOUGHT = ("yield_acceleration", "decay_rate", "delta_mu")
 
-#: Standard deviation of an offset, drift or step, in parts of a channel's largest value: no bound,
-#: in effect.
+#: Standard deviation of an offset, drift or step, in parts of a channel's largest value: so large
+#: that it sets no bound.
 _LARGE = 3.0
 
-#: Samples at rest at least that show the noise of a sensor.
+#: Fewest samples at rest that show the noise of a sensor.
 _AT_REST = 20
 
-#: Intervals of sampling to either side of a jump that are left out; consecutive samples, and
-#: standard deviations of the noise, by which a block slips upslope.
+#: Samples nearer to a jump than so many intervals of sampling are left out.
 _BESIDE_A_JUMP = 1.6
+
+#: A block slips upslope where so many consecutive samples of its velocity lie below zero by more
+#: than so many standard deviations of the noise.
 _UPSLOPE_SAMPLES = 4
 _UPSLOPE_NOISE = 5.0
 
@@ -135,16 +137,9 @@ class Observation:
             scatter = np.fmax(scatter, np.nanstd(at_rest, axis=1))
         self.sensor_noise = np.where(np.isnan(self.stated_noise), scatter, self.stated_noise)
         self.colour = np.zeros(len(self.channels))
-        self.lines: list[Line] = []
-        self.table_lines: list[Line] = []
-        since = (test.times - test.times[0]) / (test.times[-1] - test.times[0])
-        for name, values in test.channels.items():
-            size = 1.0 if name == TABLE else _LARGE * float(np.nanmax(np.abs(values)))
-            lines = self.table_lines if name == TABLE else self.lines
-            if name in offsets or name in self.drifts:
-                lines.append(Line("offset", name, size, np.full(since.size, size)))
-            if name in self.drifts:
-                lines.append(Line("drift", name, size, size * since))
+        lines = _lines_of(test, offsets, self.drifts)
+        self.lines = [line for line in lines if line.channel != TABLE]
+        self.table_lines = [line for line in lines if line.channel == TABLE]
         columns = [
             np.interp(self.motion.times, test.times, line.values) for line in self.table_lines
         ]
@@ -260,6 +255,19 @@ class Observation:
                 name = f"upslope slip at {times[slip.start]:.4g} s"
                 step = size * (times > times[slip.stop - 1])
                 self.lines.append(Line(name, "relative_displacement", size, step))
+
+
+def _lines_of(test: ShakingTest, offsets: Sequence[str], drifts: Sequence[str]) -> list[Line]:
+    """Return offsets and drifts of channels; a channel that drifts has an offset, too."""
+    lines = []
+    since = (test.times - test.times[0]) / (test.times[-1] - test.times[0])
+    for name, values in test.channels.items():
+        size = 1.0 if name == TABLE else _LARGE * float(np.nanmax(np.abs(values)))
+        if name in offsets or name in drifts:
+            lines.append(Line("offset", name, size, np.full(since.size, size)))
+        if name in drifts:
+            lines.append(Line("drift", name, size, size * since))
+    return lines
 
 
 def _weights_of(values: Floats) -> Floats:

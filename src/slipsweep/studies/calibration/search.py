@@ -20,21 +20,24 @@ from slipsweep.studies.calibration.scale import LEAST, MOST
 #: What decides the block's acceleration, for each test (`Scale.reading`).
 Readings = tuple[str, ...]
 
-#: Rise of the sum of squares at the ends of a 95 % interval, and of the least of a branch by which
-#: it is refuted.
+#: Rise of the sum of squares at the ends of a 95 % interval.
 SQUARE = QUANTILE**2
+
+#: A branch is refuted if its least sum of squares is higher than that of all by more than this.
 REFUTED = 9.0
 
-#: Minima that are followed, at this distance in Üy at least in parts of the peak, and the rise of
-#: the sum of squares above the least beyond which none can become the least; the distance from
-#: which on minima are said to be several solutions.
+#: Up to this rise it may be refuted wrongly, as its residuals were linearised elsewhere.
+_NARROWLY = 20.0
+
+#: Most minima that are followed, and their least distance in Üy, in parts of the peak.
 _MINIMA = 6
 _APART = 0.004
-_HOPELESS = 60.0
-_SEVERAL = 0.02
 
-#: Rise of the least of a branch up to which it may be refuted wrongly.
-_NARROWLY = 20.0
+#: A minimum whose sum of squares is higher by more than this cannot become the least.
+_HOPELESS = 60.0
+
+#: Minima at this distance in Üy, in parts of the peak, are several solutions.
+_SEVERAL = 0.02
 
 
 class Tried(NamedTuple):

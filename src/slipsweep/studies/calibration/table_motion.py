@@ -23,22 +23,27 @@ from slipsweep.studies.calibration.noise import (
     most_likely_colour,
 )
 
-#: Degree of the spline, and most coefficients whose uncertainty is followed; each costs a solution.
+#: Degree of the spline.
 _DEGREE = 3
+
+#: Most coefficients whose uncertainty is followed; each takes a solution of the model.
 _MOST_SHAPES = 150
 
-#: Samples for each coefficient that are tried, and by how many of these spacings the knots are
-#: closer than by the criterion: a motion that a spline cannot follow is no noise, and enters no
-#: interval.
+#: Spacings of knots that are tried, in samples for each coefficient.
 _SPACINGS = (64, 48, 32, 24, 16, 12, 10, 8, 6, 5, 4, 3, 2)
+
+#: The knots are closer than by the criterion by so many of these spacings.  A motion that the
+#: spline cannot follow would be taken for noise, but no interval would include its effect.
 _FINER = 2
 
-#: Samples for each coefficient, and samples at most, by which the colour of the noise is sought;
-#: −2 ln of the likelihood within which a slower noise is as likely; fewest samples at rest that
-#: show the colour.
+#: Spacing of knots, in samples, and most samples for the estimate of the colour of the noise.
 _COLOUR_SPACING = 4
 _MOST_SAMPLES = 1500
+
+#: A slower noise is as likely if −2 ln of the likelihood is higher by at most this.
 _AS_LIKELY = 4.0
+
+#: Fewest samples at rest that show the colour of the noise.
 _SHOWS_COLOUR = 50
 
 #: Standard deviation of the level of a sensor at rest, in those of its noise: no bound, in effect.
@@ -47,11 +52,14 @@ _ANY_LEVEL = 1e3
 #: Variances of the motion over that of the noise that are tried, for its fastest part.
 _SIZES = np.geomspace(1e-14, 1e4, 91)
 
-#: Multiples of the noise, and parts of the largest acceleration, beyond which the table moves;
-#: samples that show its level at rest, and samples before the motion where a kink is tried.
+#: The table moves beyond so many times the noise, and beyond this part of its largest acceleration.
 _MOVES = 5.0
 _MOVES_PART = 0.03
+
+#: Samples that show the level of the sensor at rest.
 _AT_REST = 5
+
+#: Samples before the motion where a kink is tried.
 _KINK_SAMPLES = 12
 
 
@@ -157,7 +165,7 @@ def table_motion(times: Floats, acceleration: Floats) -> TableMotion:
     fine = np.interp(
         np.arange((bounds.size - 1) * parts + 1) / parts, np.arange(bounds.size), bounds
     )
-    # of many coefficients only what is wrong over long times matters, which fewer can say
+    # of many coefficients only slow errors matter, and fewer coefficients have these, too
     coarse = knots if knots.size <= _MOST_SHAPES else _knots(times, -(-times.size // _MOST_SHAPES))
     design = record.design(coarse)
     root = cholesky((design.T @ design).toarray() + 1e-9 * np.eye(design.shape[1]), lower=True)
@@ -165,14 +173,14 @@ def table_motion(times: Floats, acceleration: Floats) -> TableMotion:
     errors = [noise * solve_triangular(root, np.eye(root.shape[0]), lower=True).T]
     smooth = np.asarray(best.spline(fine))
     for _, fits in kinked:
-        # of a converter's noise only a part is seen as scatter
+        # the scatter shows only a part of a converter's noise
         off, deviations = _averaged(fits, fine, (best.noise / noise) ** 2)
         smooth = smooth + off
         basis.append(csr_array(deviations))
         errors.append(np.eye(deviations.shape[1]))
-    # chords of a curve lie on its hollow side: moved back by their mean distance, the integral is
-    # right; beside a kink the curve bends only over the shorter of two intervals, which may be much
-    # the shorter
+    # straight lines between points of a curve lie on its concave side: they are moved back by their
+    # mean distance, so that the integral is right.  Beside a kink, the shorter of two intervals
+    # counts
     width = np.minimum(np.diff(fine, prepend=-np.inf), np.diff(fine, append=np.inf))
     smooth = smooth - width**2 / 12.0 * best.spline(fine, nu=2)
     return TableMotion(
@@ -259,7 +267,7 @@ def _unlikeliness(record: _Record, design: Floats, third: Floats, free: int) -> 
     rough, vectors = np.linalg.eigh(smooth @ smooth.T)
     along = vectors.T @ solve_triangular(root, design.T @ whitened, lower=True)
     outside = float(whitened @ whitened - along @ along)
-    # parabolas on either side of a kink cost nothing
+    # the penalty does not act on parabolas on either side of a kink
     rough = np.maximum(rough[free:], 1e-15 * rough[-1])
     size = whitened.size - free
     shares = 1.0 + rough[-1] * _SIZES[:, None] / rough

@@ -11,12 +11,11 @@ from scipy import stats
 
 import slipsweep
 from slipsweep import InputError
-from slipsweep.model import equations
 from slipsweep.motion.shaking import read_test
-from slipsweep.studies.calibration.measured_friction import _mean, eq1_friction
+from slipsweep.studies.calibration.measured_friction import mean_with_interval
 from tests.support.shaking import CONTINUOUS, STICK_SLIP, coulomb, exact, measured
 
-GIVEN = {"theta": STICK_SLIP["theta"], "mu_s": STICK_SLIP["mu_s"]}
+BLOCK = {"theta": STICK_SLIP["theta"], "mu_s": STICK_SLIP["mu_s"]}
 
 
 @pytest.fixture(scope="module")
@@ -25,14 +24,15 @@ def stick_slip() -> xr.Dataset:
 
 
 def friction(test: Any, **options: Any) -> xr.Dataset:
-    return slipsweep.measured_friction(test, **{**GIVEN, **options})
+    return slipsweep.measured_friction(test, **{**BLOCK, **options})
 
 
-def test_few_slides_have_the_interval_of_student() -> None:
+def test_friction_of_few_slides_has_the_interval_of_students_distribution() -> None:
     values = np.array([0.2, 0.3, 0.4])
-    np.testing.assert_allclose(
-        _mean(values, 0.0, 0.0)[[0, 2]], stats.t.interval(0.95, 2, 0.3, stats.sem(values))
-    )
+    low, mean, high = mean_with_interval(values, noise=0.0, systematic=0.0)
+    assert mean == pytest.approx(0.3)
+    expected = stats.t.interval(0.95, 2, 0.3, stats.sem(values))
+    np.testing.assert_allclose([low, high], expected)
 
 
 def test_friction_is_that_of_the_simulation(stick_slip: xr.Dataset) -> None:
@@ -50,13 +50,18 @@ def test_friction_is_that_of_the_simulation(stick_slip: xr.Dataset) -> None:
     np.testing.assert_allclose(found.friction_ratio, found.friction_coefficient / 0.38, rtol=1e-15)
 
 
-def test_eq1_is_that_of_the_equations() -> None:
-    values = eq1_friction(np.array([-2.0, 3.0]), np.array([-1.0, 2.5]), 8.0, 0.4, 9.81)
-    for i, (table, block) in enumerate(((-2.0, -1.0), (3.0, 2.5))):
-        expected = equations.mobilised_friction(
-            table, block, 0.4, math.tan(math.radians(8.0)), 9.81
-        )
-        assert values[i] == pytest.approx(expected, rel=1e-14)
+def test_friction_by_eq1_takes_magnitudes_of_both_accelerations() -> None:
+    """At ±2 m/s² of the table and ±1 m/s² of the block only g + Üg tan θ differs."""
+    times = np.arange(20.0)
+    table = np.tile([2.0, -2.0], 10)
+    test = xr.Dataset(
+        {"ground_acceleration": ("time", table), "block_acceleration": ("time", 0.5 * table)},
+        {"time": times},
+    )
+    found = slipsweep.measured_friction(test, 45.0, 0.4, g=10.0)
+    # 0.4 - 1 - (2 - 1 - 10) / (10 ± 2)
+    expected = [-0.6 + 9.0 / 12.0, -0.6 + 9.0 / 8.0] * 10
+    np.testing.assert_allclose(found.friction_coefficient, expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("kinetic", [0.38, 0.25])
@@ -95,7 +100,7 @@ def test_a_decaying_interface_is_not_called_constant(stick_slip: xr.Dataset) -> 
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.02])
-def test_slides_of_stick_slip(stick_slip: xr.Dataset, noise: float) -> None:
+def test_stick_slip_has_one_slide_a_cycle(stick_slip: xr.Dataset, noise: float) -> None:
     """A slide a cycle: onset where Eq. 4 first falls behind the table, peak with it, stop as simulated."""
     found = friction(measured(stick_slip, noise=noise))
     assert found.sizes["slide"] == 5
@@ -153,7 +158,7 @@ def test_the_threshold_is_reported(stick_slip: xr.Dataset) -> None:
     assert friction(stick_slip, threshold=5.0).sizes["slide"] == 0
 
 
-def test_unequal_sampling(stick_slip: xr.Dataset) -> None:
+def test_friction_does_not_depend_on_equal_sampling(stick_slip: xr.Dataset) -> None:
     kept = np.sort(
         np.random.default_rng(1).permutation(stick_slip.time.size)[: stick_slip.time.size * 2 // 3]
     )
@@ -238,7 +243,7 @@ ROWS = "".join(f"{i / 100},{math.sin(i)},{math.sin(i)}\n" for i in range(20))
         ),
     ],
 )
-def test_files_that_are_no_tests(text: str, message: str, tmp_path: Path) -> None:
+def test_files_that_are_no_tests_are_refused(text: str, message: str, tmp_path: Path) -> None:
     path = tmp_path / "test.csv"
     path.write_text(text)
     with pytest.raises(InputError, match=message):
@@ -255,7 +260,7 @@ def test_files_that_are_no_tests(text: str, message: str, tmp_path: Path) -> Non
         ({"theta": 80.0}, "the block would lift off"),
     ],
 )
-def test_options_that_cannot_be(
+def test_impossible_options_are_refused(
     stick_slip: xr.Dataset, options: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(InputError, match=message):

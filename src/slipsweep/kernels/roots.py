@@ -1,4 +1,4 @@
-"""Events: where something of the motion passes zero.  The one root finder of the kernels.
+"""The one root finder of the kernels: events are where something of the motion passes zero.
 
 It is Newton's iteration, kept in a bracket, which is halved where Newton's steps would leave it or
 come to no end.  A root that is not found is NaN, and so is then the displacement: the run ends with

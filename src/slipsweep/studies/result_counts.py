@@ -1,4 +1,4 @@
-"""Counts of sliding modes and flags in results, and the spread of the displacement about Newmark's."""
+"""Counts of sliding modes and flags in results, and ratios of displacements to Newmark's."""
 
 import math
 from dataclasses import dataclass, field
@@ -12,8 +12,8 @@ from slipsweep.errors import InputError
 from slipsweep.grid.chunks import CHUNK_CELLS, grid_chunks
 from slipsweep.model.variables import SensitivityStatus, SlidingMode, Validity
 
-#: Ratios are counted in this many classes of equal width in their logarithms, 0.1 % wide, between
-#: these.
+#: Number of classes of ratios, and the ratios at their ends.  All classes have the same width in the
+#: logarithm of the ratio, 0.1 %.
 _CLASSES = 32_000
 _LEAST = 1e-7
 _LARGEST = 1e7
@@ -23,19 +23,20 @@ _MOVED = ("permanent_displacement", "newmark_displacement")
 
 @dataclass
 class Ratios:
-    """Ratios of displacements, counted in classes, so that those of any number of cells take little memory."""
+    """Ratios of displacements, counted in classes: the memory does not grow with the cells."""
 
     counts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(_CLASSES, np.int64))
 
     def add(self, values: NDArray[Any], others: NDArray[Any]) -> None:
-        """Count values over others, where neither is zero or missing; a negative one as the least."""
-        there = (values != 0.0) & (others != 0.0) & np.isfinite(values) & np.isfinite(others)
-        ratios = np.clip(
-            np.divide(values[there], others[there], dtype=np.float64), _LEAST, _LARGEST
-        )
-        self.counts += np.histogram(
-            np.log(ratios), _CLASSES, (math.log(_LEAST), math.log(_LARGEST))
-        )[0]
+        """Count the ratios of values to others, where neither is zero or missing.
+
+        A negative ratio counts as the least.
+        """
+        counted = (values != 0.0) & (others != 0.0) & np.isfinite(values) & np.isfinite(others)
+        ratios = np.divide(values[counted], others[counted], dtype=np.float64)
+        logarithms = np.log(np.clip(ratios, _LEAST, _LARGEST))
+        ends = (math.log(_LEAST), math.log(_LARGEST))
+        self.counts += np.histogram(logarithms, _CLASSES, ends)[0]
 
     @property
     def number(self) -> int:
@@ -43,7 +44,7 @@ class Ratios:
         return int(self.counts.sum())
 
     def quantile(self, share: float) -> float:
-        """The ratio that a share of them does not exceed; NaN of none."""
+        """Return the ratio that a share of all ratios does not exceed (NaN: there are none)."""
         if not self.number:
             return math.nan
         at = int(np.searchsorted(np.cumsum(self.counts), share * self.number))
@@ -52,7 +53,11 @@ class Ratios:
 
 @dataclass
 class Indices:
-    """Sobol indices of grid points: how many have them, or why not; by input the means, and where it is the largest."""
+    """Sobol indices of all grid points, summed up.
+
+    `status` counts the grid points of each status.  By input, `first` and `total` are the means of
+    its indices, and `largest` is the number of points at which its total index is the largest.
+    """
 
     status: dict[SensitivityStatus, int]
     first: dict[str, float]
@@ -62,9 +67,10 @@ class Indices:
 
 @dataclass
 class Tally:
-    """Counts of cells, all and those of each sliding mode and each flag, and displacements over Newmark's.
+    """Counts of cells: all of them, and those of each sliding mode and each flag.
 
-    None: not stored.  Of samples the cells are grid points, and a count is the sum of their shares.
+    `ratios` are displacements over Newmark's.  None stands for results that are not stored.  In
+    results of samples the cells are grid points, and a count is the sum of their shares.
     `unflagged` cells have lost their flags in another program.
     """
 
@@ -76,12 +82,15 @@ class Tally:
     indices: Indices | None = None
 
     def share(self, count: float) -> float:
-        """A count over all cells."""
+        """Return a count as a share of all cells."""
         return count / max(self.cells, 1)
 
 
 def tally_of(results: xr.Dataset) -> Tally:
-    """Count results, read in chunks; what is not counted is not read (InputError: not of the same cells)."""
+    """Count the results of a Dataset, chunk by chunk; only what is counted is read.
+
+    InputError: sliding modes and flags are not of the same cells.
+    """
     if {"flag_share", "flag", "valueless_share"} <= results.variables.keys():
         return _tally_of_samples(results)
     names = [name for name in ("sliding_mode", "validity") if name in results.data_vars]
@@ -115,13 +124,12 @@ def tally_of(results: xr.Dataset) -> Tally:
 
 
 def _tally_of_samples(results: xr.Dataset) -> Tally:
-    """Sum up the shares of samples at all grid points."""
+    """Return the sums of the shares of samples over all grid points."""
 
-    def sums(name: str, own: str) -> dict[int, float]:
-        shares = results[name].transpose(..., own).values.reshape(-1, results.sizes[own])
-        return dict(
-            zip(results[own].values.tolist(), shares.sum(axis=0, dtype=np.float64), strict=True)
-        )
+    def sums(name: str, code: str) -> dict[int, float]:
+        shares = results[name].transpose(..., code).values.reshape(-1, results.sizes[code])
+        codes = results[code].values.tolist()
+        return dict(zip(codes, shares.sum(axis=0, dtype=np.float64), strict=True))
 
     valueless = results["valueless_share"]
     tally = Tally(
@@ -145,13 +153,13 @@ def _tally_of_samples(results: xr.Dataset) -> Tally:
             for name in ("first_order_index", "total_index")
         ]
         rows = np.stack(both).reshape(2, -1, results.sizes["input"]).astype(np.float64)
-        # a file may have passed through other programs
+        # another program may have removed some of the values
         rows = rows[:, (status.values.ravel() == 0) & np.isfinite(rows).all(axis=(0, 2))]
         means = rows.sum(axis=1) / max(rows.shape[1], 1)
         largest = np.bincount(rows[1].argmax(axis=1), minlength=rows.shape[2])
         inputs = results["input"].values.astype(str).tolist()
         tally.indices = Indices(
-            {one: int(np.count_nonzero(status == int(one))) for one in SensitivityStatus},
+            {code: int(np.count_nonzero(status == int(code))) for code in SensitivityStatus},
             *(dict(zip(inputs, values.tolist(), strict=True)) for values in (*means, largest)),
         )
     return tally

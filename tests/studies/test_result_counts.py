@@ -1,4 +1,4 @@
-"""Counts of results: sliding modes, flags, ratios to Newmark's block and Sobol indices, of tables made by hand."""
+"""Counts of tables made by hand: sliding modes, flags, ratios to Newmark's block, Sobol indices."""
 
 import math
 
@@ -7,9 +7,9 @@ import pytest
 import xarray as xr
 
 from slipsweep.errors import InputError
-from slipsweep.grid import tally
-from slipsweep.grid.tally import Ratios, tally_of
 from slipsweep.model.variables import SensitivityStatus, SlidingMode, Validity
+from slipsweep.studies import result_counts
+from slipsweep.studies.result_counts import Ratios, tally_of
 
 MODES = [[0, 1, 1], [2, -1, 1]]
 FLAGS = [[0, 16, 16 | 1024], [512, 1, 0]]
@@ -25,7 +25,7 @@ def table(**more: object) -> xr.Dataset:
 def test_modes_and_flags_are_counted_once_in_chunks(
     cells: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(tally, "CHUNK_CELLS", cells)
+    monkeypatch.setattr(result_counts, "CHUNK_CELLS", cells)
     found = tally_of(table())
     assert found.cells == 6
     assert found.modes == {
@@ -71,7 +71,7 @@ def test_codes_of_other_cells_are_refused() -> None:
 
 
 def test_shares_of_samples_are_summed_over_grid_points() -> None:
-    """Modes, flags and what has no value; the input with the largest total index, not first-order one."""
+    """Modes, flags, cells without a value; the input with the largest total index."""
     first = np.array([[0.6, 0.3], [0.5, 0.4], [np.nan, np.nan]])
     total = np.array([[0.5, 0.8], [0.3, 0.9], [np.nan, np.nan]])
     found = tally_of(
