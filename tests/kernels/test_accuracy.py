@@ -148,8 +148,10 @@ def test_many_cycles(cell: strategies.Cell, cycles: int) -> None:
     [(10.15, 0.2, 1.223, 4), (10.15, 0.2, 1.223, 6), (13.22, 0.257, 1.822, 7)],
 )
 def test_pulses_that_lose_speed(theta: float, mu_s: float, amplitude: float, cycles: int) -> None:
-    """At rest the block sticks beyond Üg = Üy; carried on, it slides through ever more slowly, every third or
-    fourth pulse begins again, and W of the cycles repeats."""
+    """At rest the block sticks beyond Üg = Üy; carried on, it slides through ever more slowly.
+
+    Every third or fourth pulse begins again, and W of the cycles repeats.
+    """
     cell: strategies.Cell = {
         "theta": theta,
         "mu_s": mu_s,

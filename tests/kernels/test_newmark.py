@@ -25,7 +25,9 @@ G = 9.81
 def test_newmark_against_pyslammer(
     theta: float, mu_s: float, amplitude: float, frequency: float, cycles: int
 ) -> None:
-    """pySLAMMER takes the trapezoidal rule from sample to sample, onset and stop at the samples: second order.
+    """pySLAMMER takes the trapezoidal rule from sample to sample: of second order.
+
+    Onset and stop are at samples there.
 
     At 256 samples a cycle it is seen to err by up to 4e-4 in these cells, so that 16384
     samples must agree to 5e-7, with a margin of 5 on the order.

@@ -115,7 +115,7 @@ def test_integrals_of_eq4_on_a_linear_piece(decay: float, x: float, change: floa
     "name", ["Northridge_1994_PAC-175", "Cape_Mendocino_1992_PET-090", "Duzce_1999_375-090"]
 )
 def test_newmark_against_pyslammer_on_its_ground_motions(name: str) -> None:
-    """pySLAMMER finds onset and stop at samples: refining the same straight lines, it comes to this answer.
+    """pySLAMMER finds onset and stop at samples: with finer samples it comes to this answer.
 
     Its error falls with the step, and as the square of it where its tolerance of 1e-5 m/s on the
     stop does not show.
@@ -229,7 +229,7 @@ def test_a_rise_beyond_a_turn_of_eq4_comes_to_an_end() -> None:
 
 @pytest.mark.parametrize("recoupling", ["eq12", "integrate"])
 def test_a_block_that_stops_on_a_plateau_slides_again_at_once(recoupling: str) -> None:
-    """Held at what the peak before gave, b is above the plateau; at rest there it is below it: c of the plateau.
+    """Held from the peak before, b is above the plateau; at rest there it is c, below it.
 
     On the rise that follows b goes on from c, not from what it was on the rise to the plateau.
     """
