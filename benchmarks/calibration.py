@@ -17,7 +17,7 @@ import xarray as xr
 import slipsweep
 from benchmarks.machine import arguments, cores, measured_on, table
 from slipsweep.model.variables import Validity
-from slipsweep.motion.shaking import CHANNELS
+from slipsweep.studies.calibration.shaking_test import CHANNELS
 from tests.support.shaking import SOUGHT, measured
 
 KINDS = {"eq4": "Eq. 4 acts", "yield": "yield governs", "continuous": "continuous"}

@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 
 import slipsweep
 from benchmarks.machine import arguments, cores, table
-from slipsweep.motion.shaking import CHANNELS
+from slipsweep.studies.calibration.shaking_test import CHANNELS
 
 #: Friction coefficient that the blocks have at rest where it falls, and at speed where it rises:
 #: that of the paper's interface.

@@ -69,7 +69,15 @@ def test_file_and_table_have_the_quantiles_of_the_suite(folder: Path, expected: 
         assert "32 required strengths (2 amplitude x 2 displacement x 2 polarity x 4 motion)" in (
             done.stdout
         )
-        rows = [line.split() for line in done.stdout.splitlines() if line.startswith("amplitude =")]
+        lines = done.stdout.splitlines()
+        headings = [" ".join(line.split()) for line in lines if line.endswith("always  never")]
+        assert headings == ["16 % median 84 % always never"]
+        rows = [line.split() for line in lines if line.startswith("amplitude =")]
+        assert [" ".join(words[:-5]) for words in rows] == [
+            f"amplitude = {pga}, displacement = {length}"
+            for pga in (0.2, 0.4)
+            for length in (0.02, 0.05)
+        ]
         quantiles = expected.required_yield_coefficient_quantile.values.reshape(4, 3)
         printed = np.array([[float(word) for word in words[-5:-2]] for words in rows])
         np.testing.assert_allclose(printed, quantiles, rtol=6e-4)

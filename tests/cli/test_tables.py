@@ -242,6 +242,19 @@ def test_hazard_prints_rates_periods_steps_and_parts(folder: Path) -> None:
     assert "amplitudes of the result 0.02039 to 0.6116 g, hazard curve 0.01 to 1 g\n" in text
 
 
+@pytest.mark.parametrize(("displacement", "is_held"), [("0.01mm", False), ("10mm", True)])
+def test_hazard_says_where_a_twentieth_of_a_rate_is_held_above_the_axis(
+    folder: Path, displacement: str, is_held: bool
+) -> None:
+    text = printed(folder, "hazard", "suite.nc", "--curve", "hazard.csv", "-d", displacement)
+    data = slipsweep.open_result(folder / "suite.nc").load()
+    found = slipsweep.displacement_hazard(data, folder / "hazard.csv", displacement)
+    assert (found.held_rate > 0.05 * found.annual_rate).any() == is_held
+    assert ("\nabove 0.6116 g P(u > d) is taken as it is there: to compute it, " in text) == is_held
+    # nothing slides at the lower end of the axis
+    assert "nothing is counted" not in text
+
+
 def test_limits_of_a_suite_have_quantiles_counts_and_every_motion(folder: Path) -> None:
     """All in g: quantiles at each grid point, then the limits one by one."""
     options = ("-d", "1cm", "--maximum-amplitude", "0.6g", "-o", "limits.nc")
