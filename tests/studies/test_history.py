@@ -308,8 +308,7 @@ def test_a_history_ends_with_its_last_sample(amplitude: float) -> None:
     block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.38, "yield_acceleration": 0.59}
     block |= {"amplitude": amplitude, "frequency": 1.8, "times": [0.5, 1.0]}
     endless, short = (
-        simulate(**block, excitation=Sine(cycles=cycles))
-        for cycles in (1_000_000_000, 10)
+        simulate(**block, excitation=Sine(cycles=cycles)) for cycles in (1_000_000_000, 10)
     )
     np.testing.assert_array_equal(endless.relative_displacement, short.relative_displacement)
     assert short.relative_displacement[-1] > 0.0
