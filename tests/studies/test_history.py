@@ -302,6 +302,18 @@ def test_what_a_record_refuses(shaking: Record, given: dict[str, Any], message: 
         simulate(5.0, 0.4, excitation=shaking, **given)
 
 
+@pytest.mark.parametrize("amplitude", [3.55, 9.5])
+def test_a_history_ends_with_its_last_sample(amplitude: float) -> None:
+    """It is not followed through the cycles after that, which would take hours here."""
+    block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.38, "yield_acceleration": 0.59}
+    block |= {"amplitude": amplitude, "frequency": 1.8, "times": [0.5, 1.0]}
+    endless, short = (
+        simulate(**block, excitation=Sine(cycles=cycles)) for cycles in (1_000_000_000, 10)
+    )
+    np.testing.assert_array_equal(endless.relative_displacement, short.relative_displacement)
+    assert short.relative_displacement[-1] > 0.0
+
+
 #: Sends itself Ctrl-C when the kernel of a long history begins.
 ENDLESS = """
 import os, signal, threading
