@@ -24,13 +24,14 @@ def points() -> list[Point]:
     return [Point(*row) for row in rows.itertuples(index=False)]
 
 
-def cycle_errors(found: list[Point]) -> str:
+def cycle_errors(points: list[Point]) -> str:
     """Errors and time of the cycle solver."""
     rows = []
-    for point in found:
+    for point in points:
         if point.solver == "cycle":
             errors = (
-                number(one, 2) for one in (point.median_error, point.error_95, point.worst_error)
+                number(error, 2)
+                for error in (point.median_error, point.error_95, point.worst_error)
             )
             rows.append(
                 [point.regime.replace("_", "–"), *errors, number(point.seconds_per_cell * 1e9)]
@@ -68,7 +69,7 @@ def newmark() -> str:
 
 def main() -> None:
     """Write docs/accuracy.md."""
-    found = points()
+    measured = points()
     (DOCS / "accuracy.md").write_text(f"""# Accuracy
 
 This page compares errors of the solvers, numbers of steps, and the limits of double precision.
@@ -80,7 +81,7 @@ yield, near static failure, at the mode limit, under sharply decaying friction o
 
 ## The cycle solver (default)
 
-{cycle_errors(found)}
+{cycle_errors(measured)}
 It takes no steps, so that there is no number of steps to choose. The largest errors are in cells
 nearest to yield. There the rounding of the inputs alone has the same effect (below).
 
@@ -101,7 +102,7 @@ solvers with these forms. Errors here are those of the cycle solver.
 Time a cell on one core, µs, and in brackets the steps a cycle, for 95 of 100 cells to be within an
 error ("–": not within 16384 steps):
 
-{coarsest(found, REGIMES, RULES, WANTED)}
+{coarsest(measured, REGIMES, RULES, WANTED)}
 In stick–slip and for Newmark's block the rectangle rule does better than its order: the first-order
 part of its error in the displacement is half a step times the change of velocity, and the block
 begins and ends at rest.

@@ -47,10 +47,10 @@ def cells_of(group: Group) -> Any:
     theta, mu_s, amplitude = (
         xr.DataArray(group.inputs[name], dims="cell") for name in ("theta", "mu_s", "amplitude")
     )
-    found = slipsweep.friction_parameters(theta, mu_s, amplitude)
-    onset = found.yield_acceleration
-    most = mu_s + found.delta_mu
-    decay = found.decay_rate
+    friction = slipsweep.friction_parameters(theta, mu_s, amplitude)
+    onset = friction.yield_acceleration
+    most = mu_s + friction.delta_mu
+    decay = friction.decay_rate
     law = xr.full_like(mu_s, group.model == "mendez", float)
     return np.nan_to_num(
         np.stack([amplitude, onset, mu_s, np.tan(np.radians(theta)), most, decay, law], axis=1)
@@ -92,7 +92,7 @@ def _diffrax(tolerance: float) -> Any:
     stop = diffrax.Event(moving, bisection(1e-14, 1e-14))
 
     def solve(cell: Any) -> Any:
-        found = diffrax.diffeqsolve(
+        solution = diffrax.diffeqsolve(
             term,
             diffrax.Dopri8(),
             jnp.arcsin(cell[1] / cell[0]),
@@ -105,7 +105,7 @@ def _diffrax(tolerance: float) -> Any:
             max_steps=100_000,
             throw=False,
         )
-        return found.ys[0, 1]
+        return solution.ys[0, 1]
 
     return jax.jit(jax.vmap(solve))
 
@@ -126,7 +126,7 @@ def by_cyrk(group: Group, tolerance: float) -> Any:
 
 def _one_by_one(group: Group, solve_ivp: Any, tolerance: float) -> Any:
     derivatives, stop = _compiled()
-    found = []
+    displacements = []
     for cell in cells_of(group):
         y = np.zeros(2)
         ends = [float(np.arcsin(cell[1] / cell[0])), PEAK, ZERO, END]
@@ -145,8 +145,8 @@ def _one_by_one(group: Group, solve_ivp: Any, tolerance: float) -> Any:
             y = np.array(run.y[:, -1])
             if events and len(run.t_events[0]):
                 break
-        found.append(y[1])
-    return _unscaled(group, np.array(found))
+        displacements.append(y[1])
+    return _unscaled(group, np.array(displacements))
 
 
 @cache
@@ -181,9 +181,9 @@ def by_pyslammer(group: Group, steps: int) -> Any:
     return np.array([run.max_sliding_disp for run in runs]) / group.inputs["frequency"] ** 2
 
 
-def _unscaled(group: Group, found: Any) -> Any:
+def _unscaled(group: Group, scaled: Any) -> Any:
     return (
-        np.asarray(found)
+        np.asarray(scaled)
         * group.inputs["amplitude"]
         / (2.0 * np.pi * group.inputs["frequency"]) ** 2
     )

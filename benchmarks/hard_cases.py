@@ -22,8 +22,8 @@ STEPPED = [(rule, steps) for rule in ("trapezoid", "simpson") for steps in (1024
 def row_of(number_of_case: int, category: str, cell: dict[str, Any]) -> dict[str, Any]:
     """One line of hard_cases.csv."""
     defaults = {"model": "mendez", "rise": "monotone", "recoupling": "eq12", "g": G}
-    found = conditioning(cell, dtype_of(category))
-    return {"case": number_of_case, "category": category, **defaults, **cell, **found}
+    bounds = conditioning(cell, dtype_of(category))
+    return {"case": number_of_case, "category": category, **defaults, **cell, **bounds}
 
 
 def write_cases() -> None:
@@ -72,22 +72,23 @@ def errors_table(cases: list[Case], answers: dict[str, dict[int, Found]]) -> str
     """A line a category: conditioning, and the errors of every solver in units of it."""
     rows = []
     for name in (category.__name__ for category in CATEGORIES):
-        own = [case for case in cases if case.category == name]
-        moving = [case for case in own if float(case.permanent_displacement or "0")]
-        row = [name.replace("_", " "), len(own)]
+        of_category = [case for case in cases if case.category == name]
+        moving = [case for case in of_category if float(case.permanent_displacement or "0")]
+        row = [name.replace("_", " "), len(of_category)]
         relative = [
             float(mpf(case.displacement_bound) / abs(mpf(case.permanent_displacement)))
             for case in moving
         ]
         row.append(span(relative) if relative else "at rest")
-        for found in answers.values():
-            answered = [case for case in own if case.sliding_mode >= 0]
+        for answers_of_solver in answers.values():
+            answered = [case for case in of_category if case.sliding_mode >= 0]
             kept = [
-                float(np.dtype(dtype_of(name)).type(found[case.case][0])) for case in answered
+                float(np.dtype(dtype_of(name)).type(answers_of_solver[case.case][0]))
+                for case in answered
             ]  # as in a file
             times = [
-                case.times_bounds((one, 0.0, 0, 0))[0]
-                for case, one in zip(answered, kept, strict=True)
+                case.times_bounds((displacement, 0.0, 0, 0))[0]
+                for case, displacement in zip(answered, kept, strict=True)
             ]
             row.append(f"{number(median(times), 2)}, {number(max(times), 2)}")
         rows.append(row)
@@ -103,7 +104,8 @@ def main() -> None:
     for rule, steps in STEPPED:
         answers[f"{rule}, {steps}"] = solve(cases, solver="step", rule=rule, steps_per_cycle=steps)
     dangers = [
-        [one.__name__.replace("_", " "), (one.__doc__ or "").rstrip(".")] for one in CATEGORIES
+        [category.__name__.replace("_", " "), (category.__doc__ or "").rstrip(".")]
+        for category in CATEGORIES
     ]
     (DOCS / "hard-cases.md").write_text(f"""# Hard cases
 

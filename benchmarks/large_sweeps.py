@@ -140,8 +140,8 @@ def measured(
 
 def main() -> None:
     """Measure, and write the table."""
-    given = machine.arguments(__doc__, counts={"larger": 0})
-    lengths = (10, 5, 10, 20) if given.tiny else (100, 50, 100, 200)
+    options = machine.arguments(__doc__, counts={"larger": 0})
+    lengths = (10, 5, 10, 20) if options.tiny else (100, 50, 100, 200)
     with tempfile.TemporaryDirectory(dir=Path.cwd()) as name:
         outputs: dict[str, tuple[str, ...]] = {
             "a.nc": (),
@@ -149,13 +149,13 @@ def main() -> None:
             "a.zarr": (),
         }
         tables = []
-        if given.larger:  # first: the peak of a process begins with that of this one
+        if options.larger:  # first: the peak of a process begins with that of this one
             tables.append(
-                measured(Path(name), (lengths[0] * given.larger, *lengths[1:]), 1, {"a.nc": ()})
+                measured(Path(name), (lengths[0] * options.larger, *lengths[1:]), 1, {"a.nc": ()})
             )
-        tables.insert(0, measured(Path(name), lengths, 1 if given.tiny else TURNS, outputs))
+        tables.insert(0, measured(Path(name), lengths, 1 if options.tiny else TURNS, outputs))
     text = "\n\n".join([machine.measured_on(("numpy", "numba", "netCDF4", "zarr")), *tables])
-    (given.folder / "large_sweeps.md").write_text(text + "\n")
+    (options.folder / "large_sweeps.md").write_text(text + "\n")
     print(text)
 
 

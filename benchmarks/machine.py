@@ -37,13 +37,13 @@ def cores() -> int:
 
 def versions(packages: Iterable[str]) -> str:
     """Versions of those of `packages` that are installed, and Python's."""
-    found = [f"Python {platform.python_version()}"]
+    texts = [f"Python {platform.python_version()}"]
     for package in packages:
         try:
-            found.append(f"{package} {version(package)}")
+            texts.append(f"{package} {version(package)}")
         except PackageNotFoundError:
             continue
-    return ", ".join(found)
+    return ", ".join(texts)
 
 
 def measured_on(packages: Iterable[str] = ("numpy", "numba", "xarray"), timed: bool = True) -> str:
@@ -119,6 +119,6 @@ def arguments(
         parser.add_argument(f"--{name}", type=int, default=default, help="(default: %(default)s)")
     for name in files:
         parser.add_argument(f"--{name}", type=Path)
-    given = parser.parse_args()
-    given.folder.mkdir(parents=True, exist_ok=True)
-    return given
+    options = parser.parse_args()
+    options.folder.mkdir(parents=True, exist_ok=True)
+    return options

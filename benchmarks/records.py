@@ -75,10 +75,10 @@ def pynewmark_displacement(motion: Any, parts: int, g: float) -> float:
     return float(direct_newmark(times, values, KY, 1.0)["perm_disp"]) * g / 9.81
 
 
-def agreement(found: dict[str, Any], g: float) -> str:
+def agreement(motions_by_name: dict[str, Any], g: float) -> str:
     """A row a motion: the exact answer, and by how much the others differ."""
     rows = []
-    for name, motion in found.items():
+    for name, motion in motions_by_name.items():
         exact = exact_displacement(motion, g)
         peers = [pyslammer_displacement(motion, parts) for parts in PARTS]
         peers += [pynewmark_displacement(motion, parts, g) for parts in (1, 16)]
@@ -88,7 +88,7 @@ def agreement(found: dict[str, Any], g: float) -> str:
     return table([*header, *(f"pyNewmarkDisp, Δt/{n}" for n in (1, 16))], rows)
 
 
-def slammer_runs(path: Path, found: dict[str, Any]) -> list[Run]:
+def slammer_runs(path: Path, motions_by_name: dict[str, Any]) -> list[Run]:
     """SLAMMER's rigid blocks, both ways, from the table of its results."""
     import pandas as pd
 
@@ -97,21 +97,21 @@ def slammer_runs(path: Path, found: dict[str, Any]) -> list[Run]:
         pd.read_excel(path).drop_duplicates(["Earthquake", "Record", "ky (g)"]).to_dict("records")
     ):
         name = f"{row['Earthquake'].replace('.', '').replace(' ', '_')}_{row['Record']}"
-        if name not in found:  # --tiny
+        if name not in motions_by_name:  # --tiny
             continue
-        factor = row["Scale"] / np.abs(found[name].accel).max()  # to a peak of `Scale` g
+        factor = row["Scale"] / np.abs(motions_by_name[name].accel).max()  # to a peak of `Scale` g
         for sign, column in ((1.0, "Rigid Normal (cm)"), (-1.0, "Rigid Inverse (cm)")):
             runs.append((name, float(row["ky (g)"]), sign * factor, 0.01 * row[column]))
     return runs
 
 
-def comparison(found: dict[str, Any], runs: list[Run], g: float) -> str:
+def comparison(motions_by_name: dict[str, Any], runs: list[Run], g: float) -> str:
     """Another program's displacements over slipsweep's: slope, R², share within the tolerance.
 
     The worst are refined.
     """
     ours = np.array(
-        [exact_displacement(found[name], g, ky, factor) for name, ky, factor, _ in runs]
+        [exact_displacement(motions_by_name[name], g, ky, factor) for name, ky, factor, _ in runs]
     )
     theirs = np.array([run[-1] for run in runs])
     apart = np.abs(theirs - ours)
@@ -119,7 +119,9 @@ def comparison(found: dict[str, Any], runs: list[Run], g: float) -> str:
     rows = []
     for at in np.argsort(-apart / np.maximum(theirs, SMALL))[:5]:
         name, ky, factor, other = runs[at]
-        refined_runs = (pyslammer_displacement(found[name], parts, ky, factor) for parts in PARTS)
+        refined_runs = (
+            pyslammer_displacement(motions_by_name[name], parts, ky, factor) for parts in PARTS
+        )
         rows.append(
             [
                 name,
@@ -144,28 +146,30 @@ def comparison(found: dict[str, Any], runs: list[Run], g: float) -> str:
     )
 
 
-def main(given: argparse.Namespace) -> Path:
+def main(options: argparse.Namespace) -> Path:
     """Measure, and write the page."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the peers' own
         from pyslammer.constants import G_EARTH
 
-        found = motions()
-        if given.tiny:
-            found = dict(list(found.items())[-2:-1])
-        agree = agreement(found, G_EARTH)
-        pairs = [(name, ky) for name in found for ky in EVERY_KY]
+        motions_by_name = motions()
+        if options.tiny:
+            motions_by_name = dict(list(motions_by_name.items())[-2:-1])
+        agree = agreement(motions_by_name, G_EARTH)
+        pairs = [(name, ky) for name in motions_by_name for ky in EVERY_KY]
         fits = {
             "pySLAMMER": [
-                (name, ky, 1.0, pyslammer_displacement(found[name], 1, ky)) for name, ky in pairs
+                (name, ky, 1.0, pyslammer_displacement(motions_by_name[name], 1, ky))
+                for name, ky in pairs
             ]
         }
-        if given.slammer:
-            fits["SLAMMER"] = slammer_runs(given.slammer, found)
+        if options.slammer:
+            fits["SLAMMER"] = slammer_runs(options.slammer, motions_by_name)
         compared = "".join(
-            f"**{name}.** {comparison(found, runs, G_EARTH)}\n" for name, runs in fits.items()
+            f"**{name}.** {comparison(motions_by_name, runs, G_EARTH)}\n"
+            for name, runs in fits.items()
         )
-    page = given.folder / "records.md"
+    page = options.folder / "records.md"
     page.write_text(
         "# Newmark's block on recorded motions\n\n"
         f"{measured_on(('numpy', 'numba', 'pyslammer', 'pynewmarkdisp'))} "

@@ -75,9 +75,9 @@ def cycle_solver(tiny: bool) -> str:
             [*row, number(float(np.nanmedian(error)), 2), number(float(np.nanmax(error)), 2)]
         )
     grid = grids["design chart"]
-    found = slipsweep.sweep(**grid, variables=["sliding_mode"]).sliding_mode.values
+    modes = slipsweep.sweep(**grid, variables=["sliding_mode"]).sliding_mode.values
     shares = ", ".join(
-        f"{np.mean(found == mode):.0%} {mode.name.lower()}" for mode in slipsweep.SlidingMode
+        f"{np.mean(modes == mode):.0%} {mode.name.lower()}" for mode in slipsweep.SlidingMode
     )
     return (
         "## The cycle solver\n\n"
@@ -203,8 +203,8 @@ def start_up(tiny: bool) -> str:
 
 def main() -> None:
     """Measure everything, write report.md."""
-    given = arguments(__doc__)
-    tiny = given.tiny
+    options = arguments(__doc__)
+    tiny = options.tiny
     parts = [
         "# What slipsweep takes\n\n"
         + measured_on(("numpy", "numba", "llvmlite", "xarray", "netCDF4")),
@@ -212,7 +212,7 @@ def main() -> None:
     ]
     for section in (cycle_solver, waveforms, four_dimensions, start_up):
         parts.append(section(tiny))
-        (given.folder / "report.md").write_text(
+        (options.folder / "report.md").write_text(
             "\n".join(parts)
         )  # what is measured stands, whatever comes after
 

@@ -159,14 +159,14 @@ def test_blocks_about_statistics_of_suites_do_what_they_say(tmp_path: Path) -> N
         read("docs/suites.md").split(f"\n## {name}\n")[0].count("\n")
         for name in ("Statistics", "What else takes a suite")
     )
-    found = [block for block in blocks("docs/suites.md") if begin < block.line < end]
-    assert [block.language for block in found] == ["console", "python", "text", "csv", "console"]
-    run_blocks("docs/suites.md", found, tmp_path)
+    chosen = [block for block in blocks("docs/suites.md") if begin < block.line < end]
+    assert [block.language for block in chosen] == ["console", "python", "text", "csv", "console"]
+    run_blocks("docs/suites.md", chosen, tmp_path)
 
 
-def run_blocks(document: str, found: list[Block], tmp_path: Path) -> None:
+def run_blocks(document: str, chosen: list[Block], tmp_path: Path) -> None:
     shutil.copytree(ROOT / "sweeps", tmp_path / "sweeps")
-    for block, after in zip_longest(found, found[1:]):
+    for block, after in zip_longest(chosen, chosen[1:]):
         where = f"{document}, line {block.line}"
         if block.language == "console":
             for (program, *arguments), expected in commands(block.text):
@@ -287,7 +287,7 @@ def test_comparison_with_the_paper() -> None:
         five_cycles(STICK_SLIP, 1.8, decay_rate=2.70),
         five_cycles(CONTINUOUS, 3.5, decay_rate=2.30),
     )
-    own = five_cycles(STICK_SLIP, 1.8), five_cycles(CONTINUOUS, 3.5)
+    of_paper = five_cycles(STICK_SLIP, 1.8), five_cycles(CONTINUOUS, 3.5)
     computed = [
         eqs("limiting_acceleration"),
         eqs("acceleration_ratio"),
@@ -296,7 +296,7 @@ def test_comparison_with_the_paper() -> None:
         eqs("decay_rate"),
         (f"{attenuation:.3f}", "–"),
         *zip(*printed, strict=True),
-        *zip(*own, strict=True),
+        *zip(*of_paper, strict=True),
     ]
     for (quantity, values), expected in zip(stated.items(), computed, strict=True):
         assert values == expected, quantity
@@ -363,7 +363,7 @@ def test_keys_are_those_of_the_schema(heading: str) -> None:
     families: dict[str, Any] = {"model": MODELS, "excitation": WAVEFORMS, "solver": SOLVERS}
     options = dict(families[table].options) if table in families else {}
     if table == "excitation":
-        options |= {one.name: one for one in declared(Reading)}
+        options |= {option.name: option for option in declared(Reading)}
     for name, default in spec.KEYS[table].items():
         stated = keys[name][2].strip("`")
         default = options[name].default if name in options else default
@@ -387,7 +387,9 @@ def test_units_and_bounds_of_parameters_are_those_of_the_program() -> None:
 def test_published_equations_are_those_of_the_program() -> None:
     table = rows(section("docs/published.md", "## The equations"))[1:]
     stated = [(name.strip("`"), deviation, limits) for name, _, deviation, limits in table]
-    assert stated == [(one.name, one.deviation, one.range_text) for one in EQUATIONS.values()]
+    assert stated == [
+        (equation.name, equation.deviation, equation.range_text) for equation in EQUATIONS.values()
+    ]
 
 
 def test_the_table_of_contents_of_a_file_names_every_dimension() -> None:

@@ -21,8 +21,6 @@ from .motion.waveforms import Square as Square
 from .motion.waveforms import Triangle as Triangle
 from .studies.calibration.calibrate import calibrate as calibrate
 from .studies.calibration.measured_friction import measured_friction as measured_friction
-from .studies.datasets import friction_parameters as friction_parameters
-from .studies.datasets import sweep as sweep
 from .studies.flags import flags as flags
 from .studies.hazard import displacement_hazard as displacement_hazard
 from .studies.hazard_curve import HazardCurve as HazardCurve
@@ -32,4 +30,6 @@ from .studies.published_statistics import published_statistics as published_stat
 from .studies.published_strength import published_strength as published_strength
 from .studies.required_strength import required_strength as required_strength
 from .studies.suite_statistics import suite_statistics as suite_statistics
+from .studies.sweeps import friction_parameters as friction_parameters
+from .studies.sweeps import sweep as sweep
 from .studies.uncertainty import sample as sample

@@ -117,7 +117,7 @@ def test_uncertain_inputs_of_a_sweep_file(folder: Path) -> None:
     done = command(folder, "limit", "uncertain.toml", *options)
     assert (done.returncode, done.stderr) == (0, "")
     suite = slipsweep.read_suite("sweeps/data/suite/rock-*.AT2")
-    found = slipsweep.required_strength(
+    required = slipsweep.required_strength(
         0.05,
         [0.2 * G, 0.4 * G],
         excitation=suite,
@@ -131,7 +131,7 @@ def test_uncertain_inputs_of_a_sweep_file(folder: Path) -> None:
     )
     with slipsweep.open_result(folder / "samples.nc") as table:
         np.testing.assert_array_equal(
-            table.required_yield_coefficient_quantile, found.required_yield_coefficient_quantile
+            table.required_yield_coefficient_quantile, required.required_yield_coefficient_quantile
         )
         assert table.attrs["pooled"] == "2 polarity x 4 motion"
     assert "2 polarity x 4 motion x 64 samples" in done.stdout

@@ -146,10 +146,10 @@ def filled(path: Path) -> set[str]:
 
 
 def program(name: str) -> str:
-    found = shutil.which(name)
-    if found is None:
+    path = shutil.which(name)
+    if path is None:
         pytest.skip(f"{name} is not installed")
-    return found
+    return path
 
 
 def test_the_files_hold_what_is_to_be_read(files: Path) -> None:
@@ -211,11 +211,11 @@ def test_history_times_are_seconds(files: Path, name: str) -> None:
 
 def listed(text: str, name: str) -> list[str]:
     """The values of a variable in CDL."""
-    found = re.search(
+    match = re.search(
         rf"^ ?{name} =\s*(.*?) ;", text.partition("\ndata:\n")[2], re.MULTILINE | re.DOTALL
     )
-    assert found is not None, name
-    return found[1].replace(",", " ").split()
+    assert match is not None, name
+    return match[1].replace(",", " ").split()
 
 
 def same(words: list[str], stored: np.ndarray, missing: str = "", fills: bool = False) -> None:

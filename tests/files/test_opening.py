@@ -1,6 +1,7 @@
 """Results opened again: as they were written, rewritten by other programs, or no results at all."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -125,37 +126,66 @@ def test_a_suite_with_other_motions_is_not_solved_again(folder: Path) -> None:
         spec.load(folder / "b.nc")
 
 
-@pytest.mark.parametrize("change", ["masked", "outer", "filled"])
-def test_cells_that_have_lost_their_flags_are_not_without_flags(folder: Path, change: str) -> None:
+@dataclass(frozen=True)
+class Unflagged:
+    """A result of which another program has removed the flags of some cells."""
+
+    path: Path
+    table: xr.Dataset
+    lost: xr.DataArray
+
+
+@pytest.fixture(params=["masked", "outer", "filled"])
+def unflagged(request: pytest.FixtureRequest, folder: Path) -> Unflagged:
+    """Cells masked, joined in from another result, or written with a fill value."""
     run(job_of(folder, "sweep"), folder / "a.nc")
     whole = slipsweep.open_result(folder / "a.nc").load()
-    if change == "outer":
+    if request.param == "outer":
         table = outer(whole)
         lost = table.permanent_displacement.isnull() & (table.theta % 5 == 1)
     else:
         lost = whole.theta == 5
         table = whole.where(~lost)
-        if change == "filled":
+        if request.param == "filled":
             table["validity"].encoding |= {"dtype": "int16", "_FillValue": -9}
     table.to_netcdf(folder / "b.nc")
-    opened = slipsweep.open_result(folder / "b.nc")
-    lost = lost.broadcast_like(opened.validity)
-    xr.testing.assert_equal(opened.validity.isnull().compute(), lost)
-    assert (opened.sliding_mode.where(lost, -1) == -1).all()
+    return Unflagged(folder / "b.nc", table, lost.broadcast_like(table.validity))
+
+
+def test_cells_that_have_lost_their_flags_open_without_a_value(unflagged: Unflagged) -> None:
+    opened = slipsweep.open_result(unflagged.path)
+    xr.testing.assert_equal(opened.validity.isnull().compute(), unflagged.lost)
+    assert (opened.sliding_mode.where(unflagged.lost, -1) == -1).all()
+
+
+def test_flags_of_cells_that_have_lost_them_are_refused(unflagged: Unflagged) -> None:
     with pytest.raises(InputError, match="whole numbers, of which none is missing"):
-        slipsweep.flags(opened)
-    tally = tally_of(opened)
-    assert tally.unflagged == int(lost.sum()) > 0
+        slipsweep.flags(slipsweep.open_result(unflagged.path))
+
+
+def test_cells_that_have_lost_their_flags_are_counted_by_themselves(unflagged: Unflagged) -> None:
+    tally = tally_of(slipsweep.open_result(unflagged.path))
+    assert tally.unflagged == int(unflagged.lost.sum()) > 0
     assert tally.flags is not None
+    bits = unflagged.table.validity.fillna(0).astype(int)
     for flag, count in tally.flags.items():
-        assert count == int(((table.validity.fillna(0).astype(int) & int(flag)) != 0).sum())
+        assert count == int(((bits & int(flag)) != 0).sum())
+
+
+def test_a_table_has_no_words_for_flags_that_are_lost(unflagged: Unflagged) -> None:
+    folder = unflagged.path.parent
     done = command(folder, "export", "b.nc", "-o", "b.csv", "--words")
     assert done.returncode == 0, done.stderr
     words = pd.read_csv(folder / "b.csv", keep_default_na=False)["validity"].to_numpy()
-    named = table.validity.transpose(*opened.validity.dims).values.ravel()
-    assert [bool(word) for word in words] == (np.nan_to_num(named) != 0).tolist()
-    shown = f"  not known              {tally.unflagged / tally.cells:9.2%}  another program has"
-    assert shown in command(folder, "info", "b.nc").stdout
+    opened = slipsweep.open_result(unflagged.path)
+    bits = unflagged.table.validity.transpose(*opened.validity.dims).values.ravel()
+    assert [bool(word) for word in words] == (np.nan_to_num(bits) != 0).tolist()
+
+
+def test_info_prints_the_share_of_flags_that_are_lost(unflagged: Unflagged) -> None:
+    share = float(unflagged.lost.mean())
+    line = f"  not known              {share:9.2%}  another program has"
+    assert line in command(unflagged.path.parent, "info", "b.nc").stdout
 
 
 @pytest.mark.parametrize(

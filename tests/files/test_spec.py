@@ -70,13 +70,13 @@ WORDS = {
 
 @pytest.mark.parametrize(("table", "key"), WORDS)
 def test_every_word_reaches_the_sweep(table: str, key: str) -> None:
-    found = []
+    choices = []
     for word in WORDS[table, key]:
         step = 'method = "step"\n' if key == "rule" else ""
         choice = getattr(spec.parse(f'{GOOD}[{table}]\n{step}{key} = "{word}"\n', "a.toml"), table)
         assert word in ("auto", choice.name, getattr(choice, key, None))
-        found.append(choice)
-    assert len(set(found)) == len(WORDS[table, key]) - ("auto" in WORDS[table, key])
+        choices.append(choice)
+    assert len(set(choices)) == len(WORDS[table, key]) - ("auto" in WORDS[table, key])
 
 
 def test_options_reach_the_sweep() -> None:
@@ -135,8 +135,8 @@ def test_axes_are_converted_to_the_parameters_own_units(
     name: str, units: str, factor: float
 ) -> None:
     text = axis(name, f'values = [0.25, 0.5], units = "{units}"')
-    given = spec.parse(text, "a.toml").inputs
-    np.testing.assert_allclose(given[name], np.array([0.25, 0.5]) * factor, rtol=1e-14)
+    inputs = spec.parse(text, "a.toml").inputs
+    np.testing.assert_allclose(inputs[name], np.array([0.25, 0.5]) * factor, rtol=1e-14)
 
 
 def test_g_as_a_unit_is_the_gravity_of_the_model() -> None:

@@ -169,7 +169,7 @@ def test_threads_of_others_compute_on_themselves(expected: np.ndarray) -> None:
             np.testing.assert_array_equal(result, expected)
 
 
-def test_dasks_threads(expected: np.ndarray) -> None:
+def test_dasks_threads_give_the_same_bits(expected: np.ndarray) -> None:
     lazy = slipsweep.sweep(
         **GRID, variables=["permanent_displacement"], chunks={"theta": 7, "mu_s": 13}
     )

@@ -52,9 +52,11 @@ print(round(float(found.limiting_acceleration), 3))
 
 def environment(tmp_path: Path, **others: str) -> dict[str, str]:
     (tmp_path / "ofown.py").write_text(MODULE)
-    own = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    variables = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
     return (
-        own | {"XDG_CACHE_HOME": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1"} | others
+        variables
+        | {"XDG_CACHE_HOME": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1"}
+        | others
     )
 
 
@@ -127,12 +129,12 @@ def test_of_five_processes_that_start_at_once_one_compiles_also_where_two_are_ki
     ]
     while not (tmp_path / "cache").exists() and running[0].poll() is None:
         time.sleep(0.01)
-    for one in running[:2]:
-        one.kill()
-    found = [one.communicate()[0].split() for one in running[2:]]
-    assert all(one.returncode == 0 for one in running[2:])
-    assert [float(value) for value, _ in found] == pytest.approx([TOTAL] * 3)
-    assert sum(compiled == "True" for _, compiled in found) <= 1
+    for process in running[:2]:
+        process.kill()
+    outputs = [process.communicate()[0].split() for process in running[2:]]
+    assert all(process.returncode == 0 for process in running[2:])
+    assert [float(value) for value, _ in outputs] == pytest.approx([TOTAL] * 3)
+    assert sum(compiled == "True" for _, compiled in outputs) <= 1
     assert run(ONE, env, str(tmp_path)).endswith("False"), "it is kept"
 
 
@@ -166,9 +168,9 @@ def test_kernels_are_kept_where_the_file_system_has_no_locks(tmp_path: Path) -> 
     """Whichever of its errors a file system refuses them with."""
     env = environment(tmp_path)
     errors = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS)
-    found = [process(ONE, env, str(tmp_path), preexec_fn=refusing_locks(one)) for one in errors]
-    assert [done.stdout.split()[1] for done in found] == ["True", "False", "False"]
-    assert [done.stderr for done in found] == ["", "", ""]
+    runs = [process(ONE, env, str(tmp_path), preexec_fn=refusing_locks(error)) for error in errors]
+    assert [run.stdout.split()[1] for run in runs] == ["True", "False", "False"]
+    assert [run.stderr for run in runs] == ["", "", ""]
 
 
 @pytest.mark.skipif(os.name != "posix", reason="takes homes and rights away the POSIX way")

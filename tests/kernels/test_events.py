@@ -9,7 +9,7 @@ import pytest
 import slipsweep
 from slipsweep import RunError
 from slipsweep.grid import solvers
-from slipsweep.kernels import roots, step
+from slipsweep.kernels import roots, step_cells
 from slipsweep.kernels.block import UNSOLVED
 
 
@@ -63,7 +63,7 @@ def test_a_cell_that_is_not_solved_ends_the_run_and_is_named(
     options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(solvers, "solve_walk", failing)
-    monkeypatch.setattr(step, "solve_steps", failing)
+    monkeypatch.setattr(step_cells, "solve_steps", failing)
     axes: dict[str, Any] = {
         "theta": [0.0, 5.0],
         "mu_s": 0.3,

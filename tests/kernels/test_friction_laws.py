@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import registered
-from slipsweep.kernels import step, step_cells
+from slipsweep.kernels import step, step_cells, step_newmark
 from slipsweep.kernels.block import EQ12, LITERAL, NEWMARK, RESULTS, Options
 from slipsweep.motion.cutting import path_of_waveform
 from slipsweep.motion.waveforms import Sine
@@ -45,7 +45,7 @@ def decaying_with_both(block: Any, ground: float, velocity: float, slip: float) 
 def solve_of_velocity(
     cells: Any, options: Any, path: Any, blocks: Any, steps: Any, log: Any, results: Any
 ) -> None:
-    law = step.Law(of_velocity, True, False, True, step.unlimited)
+    law = step_newmark.newmark_law(of_velocity, True, False, step.unlimited)
     step_cells.solve_cells(law, cells, options, path, blocks, steps, log, results)
 
 
@@ -53,7 +53,7 @@ def solve_of_velocity(
 def solve_decaying(
     cells: Any, options: Any, path: Any, blocks: Any, steps: Any, log: Any, results: Any
 ) -> None:
-    law = step.Law(decaying_with_both, True, False, False, step.unlimited)
+    law = step_cells.paper_law(decaying_with_both, True, False, step.unlimited)
     step_cells.solve_cells(law, cells, options, path, blocks, steps, log, results)
 
 

@@ -53,16 +53,16 @@ each = pytest.mark.parametrize(
 
 def test_every_choice_is_here() -> None:
     assert {type(choice) for _, choice in CHOSEN} == {
-        one for family in FAMILIES.values() for one in family.choices
+        each for family in FAMILIES.values() for each in family.choices
     }
 
 
 @each
 def test_choices_are_frozen_and_come_back_from_their_repr(keyword: str, choice: Choice) -> None:
     """Frozen, comparable, hashable, picklable; the repr makes it again."""
-    for one in declared(type(choice)):
+    for option in declared(type(choice)):
         with pytest.raises(dataclasses.FrozenInstanceError):
-            setattr(choice, one.name, one.default)
+            setattr(choice, option.name, option.default)
     for again in (pickle.loads(pickle.dumps(choice)), eval(repr(choice), vars(slipsweep))):
         assert again == choice
         assert hash(again) == hash(choice)

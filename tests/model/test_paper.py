@@ -108,7 +108,7 @@ def test_figures_with_the_printed_decay_rate(
 
 
 @pytest.mark.parametrize(
-    ("experiment", "frequency", "given", "displacement", "newmark", "flags"),
+    ("experiment", "frequency", "inputs", "displacement", "newmark", "flags"),
     [
         (STICK_SLIP, 1.8, {"yield_acceleration": None}, "31.0", "31.0", Validity.YIELD_GOVERNS),
         (CONTINUOUS, 3.5, {"yield_acceleration": None}, "68.9", "64.3", Validity.YIELD_GOVERNS),
@@ -127,17 +127,17 @@ def test_figures_with_the_printed_decay_rate(
         (CONTINUOUS, 3.5, {"decay_rate": 2.30, "delta_mu": 0.11}, "161.8", "316.5", Validity(0)),
     ],
 )
-def test_what_the_inputs_are_worth(
+def test_displacements_by_measured_printed_and_estimated_inputs(
     experiment: dict[str, Any],
     frequency: float,
-    given: dict[str, Any],
+    inputs: dict[str, Any],
     displacement: str,
     newmark: str,
     flags: Validity,
 ) -> None:
     """Displacements of both experiments, measured, printed and estimated, and Newmark's; mm."""
     result = slipsweep.sweep(
-        **(experiment | given),
+        **(experiment | inputs),
         frequency=frequency,
         excitation=slipsweep.Sine(cycles=5),
         variables=["permanent_displacement", "newmark_displacement", "validity"],

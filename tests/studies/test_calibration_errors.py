@@ -14,10 +14,10 @@ import xarray as xr
 import slipsweep
 from benchmarks.calibration import drawn, sensed
 from slipsweep.model.options import Mendez
-from slipsweep.motion.shaking import CHANNELS, ShakingTest
 from slipsweep.studies.calibration.calibrate import calibrate
 from slipsweep.studies.calibration.likelihood import Likelihood
 from slipsweep.studies.calibration.observation import Observation
+from slipsweep.studies.calibration.shaking_test import CHANNELS, ShakingTest
 from tests.support.shaking import SOUGHT, coloured
 
 #: Standard deviations of a normal distribution to the ends of 95 %.

@@ -11,8 +11,8 @@ from scipy import stats
 
 import slipsweep
 from slipsweep import InputError
-from slipsweep.motion.shaking import read_test
 from slipsweep.studies.calibration.measured_friction import mean_with_interval
+from slipsweep.studies.calibration.shaking_test import read_test
 from tests.support.shaking import CONTINUOUS, STICK_SLIP, coulomb, exact, measured
 
 BLOCK = {"theta": STICK_SLIP["theta"], "mu_s": STICK_SLIP["mu_s"]}

@@ -26,9 +26,9 @@ def test_modes_and_flags_are_counted_once_in_chunks(
     cells: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(result_counts, "CHUNK_CELLS", cells)
-    found = tally_of(table())
-    assert found.cells == 6
-    assert found.modes == {
+    counts_of_table = tally_of(table())
+    assert counts_of_table.cells == 6
+    assert counts_of_table.modes == {
         SlidingMode.MISSING: 1,
         SlidingMode.STUCK: 1,
         SlidingMode.STICK_SLIP: 3,
@@ -40,20 +40,20 @@ def test_modes_and_flags_are_counted_once_in_chunks(
         Validity.NEAR_MODE_LIMIT: 1,
         Validity.FRICTION_ESTIMATED: 1,
     }
-    assert found.flags == counts
-    assert found.share(3) == 0.5
-    assert found.ratios is None
+    assert counts_of_table.flags == counts
+    assert counts_of_table.share(3) == 0.5
+    assert counts_of_table.ratios is None
 
 
 def test_ratios_are_of_cells_in_which_both_blocks_slide() -> None:
     """Zeros and missing values are left out; quantiles to 0.1 %."""
     ours = np.array([[0.0, 0.2, 0.3], [4.0, np.nan, 0.5]])
     theirs = np.array([[0.1, 0.1, 0.1], [1.0, 1.0, 0.0]])
-    found = tally_of(table(permanent_displacement=ours, newmark_displacement=theirs)).ratios
-    assert found is not None
-    assert found.number == 3
+    ratios = tally_of(table(permanent_displacement=ours, newmark_displacement=theirs)).ratios
+    assert ratios is not None
+    assert ratios.number == 3
     for share, expected in ((0.1, 2.0), (0.5, 3.0), (0.9, 4.0)):
-        assert found.quantile(share) == pytest.approx(expected, rel=1.1e-3)
+        assert ratios.quantile(share) == pytest.approx(expected, rel=1.1e-3)
 
 
 def test_ratios_beyond_the_classes_count_at_their_ends() -> None:
@@ -74,7 +74,7 @@ def test_shares_of_samples_are_summed_over_grid_points() -> None:
     """Modes, flags, cells without a value; the input with the largest total index."""
     first = np.array([[0.6, 0.3], [0.5, 0.4], [np.nan, np.nan]])
     total = np.array([[0.5, 0.8], [0.3, 0.9], [np.nan, np.nan]])
-    found = tally_of(
+    sums = tally_of(
         xr.Dataset(
             {
                 "flag_share": (("amplitude", "flag"), [[0.25, 0.5], [0.0, 0.0], [0.5, 1.0]]),
@@ -91,15 +91,15 @@ def test_shares_of_samples_are_summed_over_grid_points() -> None:
             },
         )
     )
-    assert found.cells == 3
-    assert found.flags == {Validity.STATICALLY_UNSTABLE: 0.75, Validity.YIELD_GOVERNS: 1.5}
-    assert found.modes == {
+    assert sums.cells == 3
+    assert sums.flags == {Validity.STATICALLY_UNSTABLE: 0.75, Validity.YIELD_GOVERNS: 1.5}
+    assert sums.modes == {
         SlidingMode.MISSING: 0.75,
         SlidingMode.STUCK: 1.5,
         SlidingMode.STICK_SLIP: 0.75,
     }
-    assert found.share(1.5) == 0.5
-    indices = found.indices
+    assert sums.share(1.5) == 0.5
+    indices = sums.indices
     assert indices is not None
     assert indices.status == {
         SensitivityStatus.COMPUTED: 2,

@@ -289,5 +289,7 @@ def _children(pid: int) -> list[int]:
     """Processes below a process that run Python's multiprocessing: the workers."""
     children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
     return [
-        int(one) for one in children if "spawn_main" in Path(f"/proc/{one}/cmdline").read_text()
+        int(child)
+        for child in children
+        if "spawn_main" in Path(f"/proc/{child}/cmdline").read_text()
     ]

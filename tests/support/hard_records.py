@@ -69,16 +69,16 @@ def neighbours(cell: Cell) -> Iterator[Cell]:
 
 def conditioning(cell: Cell) -> tuple[RecordSolution, mpfr, mpfr]:
     """Exact response, and bounds of displacement and peak velocity, with half an ulp of theirs."""
-    own = solve(cell)
+    answer = solve(cell)
     others = [solve(other) for other in neighbours(cell)]
     with workdps(60):
         displacement = bound_of(
-            own.permanent_displacement, (other.permanent_displacement for other in others)
+            answer.permanent_displacement, (other.permanent_displacement for other in others)
         )
         return (
-            own,
+            answer,
             displacement,
-            bound_of(own.peak_relative_velocity, (o.peak_relative_velocity for o in others)),
+            bound_of(answer.peak_relative_velocity, (o.peak_relative_velocity for o in others)),
         )
 
 

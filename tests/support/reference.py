@@ -316,7 +316,7 @@ def _cut_at_onsets(
     sections: list[Section], onset: mpfr
 ) -> tuple[list[Section], list[tuple[int, int, mpfr]]]:
     """Sections cut at the first onset of each half wave; first, end and peak of these pulses."""
-    found: list[Section] = []
+    cut: list[Section] = []
     pulses = []
     done = 0
     for start, end, peak in _half_waves(sections):
@@ -324,15 +324,15 @@ def _cut_at_onsets(
             continue
         i = next(i for i in range(start, end) if max(sections[i].first, sections[i].last) > onset)
         i = next((k for k in range(start, i) if sections[k].first >= onset), i)
-        found += sections[done:i]
+        cut += sections[done:i]
         if sections[i].first < onset:
             second = sections[i].cut(onset)
-            found.append(replace(sections[i], end=second.start, last=onset))
+            cut.append(replace(sections[i], end=second.start, last=onset))
             sections[i] = second
-        pulses.append((len(found), len(found) + end - i, peak))
-        found = found + sections[i:end]
+        pulses.append((len(cut), len(cut) + end - i, peak))
+        cut = cut + sections[i:end]
         done = end
-    return found + sections[done:], pulses
+    return cut + sections[done:], pulses
 
 
 def solve_record(
@@ -425,8 +425,8 @@ def _slide(
         bottom += 1
     way_up = after[bottom:]
     at_once = another and all(
-        one.first >= 0 and one.last > 0 and (i == 0 or one.first > 0)
-        for i, one in enumerate(way_up)
+        half_wave.first >= 0 and half_wave.last > 0 and (i == 0 or half_wave.first > 0)
+        for i, half_wave in enumerate(way_up)
     )
     for section in [*pulse, *after[: len(after) if at_once else bottom]]:
         block.follow(section)

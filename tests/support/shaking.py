@@ -8,7 +8,7 @@ import xarray as xr
 from scipy.signal import lfilter
 
 import slipsweep
-from slipsweep.motion.shaking import CHANNELS, RESPONSES
+from slipsweep.studies.calibration.shaking_test import CHANNELS, RESPONSES
 
 #: One test in either sliding mode: parameters and a motion of the table.
 STICK_SLIP: dict[str, Any] = {

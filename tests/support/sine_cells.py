@@ -93,26 +93,28 @@ def drawn(seed: int, count: int) -> Drawn:
     )
 
 
-def times_bound(one: Drawn) -> Array:
+def times_bound(cells: Drawn) -> Array:
     """Difference of the two ways over its bound, of displacement or largest velocity, by cell."""
-    batches = one.swept(one.cells, walked=False)
-    walk = one.swept(one.cells)
-    drives = one.cells["amplitude"] + G * (one.cells["mu_s"] + one.cells.get("delta_mu", 0.0))
+    batches = cells.swept(cells.cells, walked=False)
+    walk = cells.swept(cells.cells)
+    drives = cells.cells["amplitude"] + G * (cells.cells["mu_s"] + cells.cells.get("delta_mu", 0.0))
     scales = {
         "permanent_displacement": drives / (2 * np.pi) ** 2,
         "peak_relative_velocity": drives / (2 * np.pi),
     }
     times = np.where(batches.validity.values == walk.validity.values, 0.0, np.inf)
     for name, scale in scales.items():
-        found = batches[name].values
+        displacement = batches[name].values
         right = walk[name].values
         apart = np.where(
-            np.isnan(found) == np.isnan(right), np.nan_to_num(np.abs(found - right)), np.inf
+            np.isnan(displacement) == np.isnan(right),
+            np.nan_to_num(np.abs(displacement - right)),
+            np.inf,
         )
-        bound = FLOOR * np.nan_to_num(np.abs(right)) + ROUNDING * one.cycles**2 * scale
+        bound = FLOOR * np.nan_to_num(np.abs(right)) + ROUNDING * cells.cycles**2 * scale
         (beyond,) = np.nonzero(np.isfinite(apart) & (apart > bound))
         if beyond.size:
-            bound[beyond] += TIMES * _spread(one, beyond, name, right[beyond])
+            bound[beyond] += TIMES * _spread(cells, beyond, name, right[beyond])
         times = np.maximum(times, apart / bound)
     return times
 

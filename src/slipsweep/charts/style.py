@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError
 from slipsweep.model import variables
 from slipsweep.model.options import MODELS
+from slipsweep.model.parameter_table import PARAMETER_TABLE
 from slipsweep.model.units import in_mm, quantity
 from slipsweep.model.variables import (
     INTENSITY_MEASURES,
@@ -61,33 +62,7 @@ COLOURS = LinearSegmentedColormap.from_list(
 )
 
 #: Symbols of the paper.
-SYMBOLS = {
-    "theta": "θ",
-    "mu_s": "μs",
-    "phi": "φ",
-    "amplitude": "A",
-    "displacement_amplitude": "d",
-    "frequency": "f",
-    "yield_acceleration": "Üy",
-    "decay_rate": "λ",
-    "delta_mu": "Δμ",
-    "minimum_friction": "μmin",
-    "residual_mu": "μr",
-    "residual_phi": "φr",
-    "weakening_distance": "D",
-    "fast_mu": "μf",
-    "rate_constant": "a",
-    "structure_frequency": "fs",
-    "yield_coefficient": "ky",
-    "upslope_yield_acceleration": "Üy,up",
-    "scale": "scale",
-    "pgv": "PGV",
-    "arias_intensity": "Ia",
-    "time_scale": "time scale",
-    "polarity": "polarity",
-    "azimuth": "azimuth",
-    "displacement": "u",
-}
+SYMBOLS = {row.name: row.symbol for row in PARAMETER_TABLE} | {"displacement": "u"}
 
 #: Sliding modes in legends and captions.
 MODE_TEXT = {

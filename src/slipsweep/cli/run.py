@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from slipsweep.files.spec import SweepSpec
 
-#: Factor on a recorded acceleration above which a motion is far from what was recorded.
+#: Factor on a recorded acceleration above which there is a caution.
 _LARGE_FACTOR = 4.0
 
 

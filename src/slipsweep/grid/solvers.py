@@ -11,7 +11,15 @@ from typing import Any, NamedTuple, TypeGuard
 import numpy as np
 
 from slipsweep.grid.inputs import Problem
-from slipsweep.kernels import block, history, newmark, newmark_record, step, step_cells, strength
+from slipsweep.kernels import (
+    block,
+    history,
+    newmark,
+    newmark_record,
+    step,
+    step_cells,
+    step_newmark,
+)
 from slipsweep.kernels.grid import CELL, find_parameters
 from slipsweep.kernels.newmark_history import fill_newmark_history
 from slipsweep.kernels.sine.solve import solve_sine
@@ -248,11 +256,13 @@ def stepper_of(
 
 
 def stepping_kernel(model: Model) -> Callable[..., Any]:
-    """Return the kernel that takes steps, which depends on the change of the block's strength."""
+    """Return the kernel that takes steps, by the model and the change of the block's strength."""
+    if not isinstance(model, Newmark):
+        return step_cells.solve_steps
     changing = changing_strength(model)
     if changing == "weakening":
-        return strength.solve_weakening
-    return strength.solve_rate if changing == "rate" else step_cells.solve_steps
+        return step_newmark.solve_weakening
+    return step_newmark.solve_rate if changing == "rate" else step_newmark.solve_newmark_steps
 
 
 def is_plain_sine(motion: Any) -> TypeGuard[Sine]:

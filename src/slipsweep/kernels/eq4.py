@@ -108,7 +108,7 @@ def inflection(block: Block) -> float:
 
 @inlined
 def opposite(a: float, b: float) -> bool:
-    """Return whether one is positive and the other negative; their product might underflow."""
+    """Return True if a and b have opposite signs; their product might underflow."""
     return a < 0.0 < b or b < 0.0 < a
 
 

@@ -59,8 +59,7 @@ FOLLOWS = 2  # stick-slip: Ü by Eq. 4, b = Ü
 ATTENUATES = 3  # from t5 on: Eq. 12
 HELD_ON = 4  # from t5 on with recoupling = "integrate": Ü = b still
 CONTINUOUS = 5  # continuous sliding: Ü by Eq. 4, V of either sign
-DOWN = 6  # Newmark's block, V > 0: Ü = Üy
-UP = 7  # Newmark's block, V < 0: Ü = −Üy,up
+SLIDES = 6  # Newmark's block (`kernels.step_newmark`): Ü = Üy, or V < 0 and Ü = −Üy,up
 
 #: How a phase ends in a step.
 GOES_ON = 0
@@ -70,20 +69,22 @@ WEAKENED = 3  # from here on the law does not depend on the slip
 
 
 class Law(NamedTuple):
-    """A friction law μ(block, Üg, v, s).
+    """A friction law μ(block, Üg, v, s), and the block that it acts on.
 
-    v is the relative velocity in m/s (of Newmark's block the speed in the direction in which it
-    slides), s = ∫|v|dt the slip in m.  `knows_motion` says whether μ
-    depends on v or s, `knows_slip` whether on s.  Newmark's block keeps its yield acceleration, or
-    (`is_strength`) has that of Coulomb with μ.  `longest_step`, of the block and the rate of V, is
-    the longest step that resolves the law (`unlimited`, if the default steps do).
+    v is the relative velocity in m/s, s = ∫|v|dt the slip in m.  `knows_motion` says whether μ
+    depends on v or s, `knows_slip` whether on s.  `longest_step`, of the block and the rate of V, is
+    the longest step that resolves the law (`unlimited`, if the default steps do).  The rest says
+    what the block does: its rate while it slides, how it waits, and how it comes to rest after the
+    shaking.  `step_cells.paper_law` makes the law of a block of the paper.
     """
 
     friction: Callable[..., float]
     knows_motion: bool
     knows_slip: bool
-    is_strength: bool
     longest_step: Callable[..., float]
+    sliding_rate: Callable[..., float]
+    wait: Callable[..., float]
+    run_out: Callable[..., None]
 
 
 #: A block: its parameters, how it is stepped, and its motion up to now.
@@ -121,6 +122,7 @@ BLOCK = np.dtype(
             ("steps", "i8"),  # in 2π of time
             ("phase", "i8"),
             ("in_pulse", "i8"),  # from Üg = Üy to the end of the positive half wave
+            ("side", "f8"),  # 1, of a block that slides upslope only −1
             ("rises", "i8"),  # Üg > 0 rises on the piece
             ("held", "f8"),  # b
             ("velocity", "f8"),  # V
@@ -199,9 +201,6 @@ SHORTEST_STEP = 1e-14
 ROUNDING = 1e-12
 LEAST_ROUNDING = 4e-16
 
-#: Yield acceleration upslope, m/s², where no acceleration moves the block that way.
-LOCKED = 1e9
-
 #: Points of a rise at which Eq. 4 is compared with Üy (`yield_governs`).
 POINTS_OF_RISE = 32
 
@@ -230,32 +229,12 @@ def eq4_at(law: Law, block: Block, ground: float) -> float:
     return ground - eq4_rate(law, block, ground, block.velocity, block.slip)
 
 
-@scalar
-def resistance(law: Law, block: Block, side: float, velocity: float, slip: float) -> float:
-    """|Ü| of Newmark's block that slides downslope (side 1) or upslope (side −1).
-
-    That is its yield acceleration, or that of Coulomb with μ at the speed in the direction of the
-    slide, which a step may carry a little below 0.
-    """
-    if not law.is_strength:
-        return block.yield_acceleration if side > 0.0 else block.upslope_yield_acceleration
-    friction = law.friction(
-        block, 0.0, side * velocity * block.seconds, slip * block.seconds * block.seconds
-    )
-    if side < 0.0 and friction * block.tan_theta >= 1.0:
-        return LOCKED
-    return eq.coulomb_yield_acceleration(friction, side * block.tan_theta, block.g)
-
-
 @inlined
 def rate(law: Law, block: Block, ground: float, velocity: float, slip: float) -> float:
     """Rate of V, Üg − Ü, in the block's phase; Eq. 12 takes no steps (`attenuate`)."""
     if block.phase == HELD or block.phase == HELD_ON:
         return ground - block.held
-    if block.phase == DOWN or block.phase == UP:
-        side = 1.0 if block.phase == DOWN else -1.0
-        return ground - side * resistance(law, block, side, velocity, slip)
-    return eq4_rate(law, block, ground, velocity, slip)
+    return law.sliding_rate(law, block, ground, velocity, slip)
 
 
 class Step(NamedTuple):
@@ -317,7 +296,8 @@ def advance_by_stages(
 ) -> Step:
     """Find what a step h gains where friction depends on the motion.
 
-    Each stage of a rule goes from the start of the step to its node with the rate of the one before.
+    Each stage of a rule goes from the start of the step to its node with the rate of the stage
+    before.
     """
     rule = block.rule
     speed = block.velocity
@@ -355,13 +335,10 @@ def ground_at(block: Block, piece: Piece, curves: np.ndarray, tau: float) -> flo
 
 @scalar
 def first_rate_at(law: Law, block: Block, ground: float) -> float:
-    """Rate at the beginning of a phase; a slide that begins from rest is not stopped by rounding."""
+    """Rate at the beginning of a phase; rounding does not stop a slide that begins from rest."""
     first_rate = rate(law, block, ground, block.velocity, block.slip)
-    if block.velocity == 0.0 and block.phase == UP:
-        return min(first_rate, 0.0)
-    if block.velocity == 0.0 and block.phase != CONTINUOUS:
-        return max(first_rate, 0.0)
-    return first_rate
+    starts = block.velocity == 0.0 and block.phase != CONTINUOUS
+    return 0.0 if starts and block.side * first_rate < 0.0 else first_rate
 
 
 @scalar
@@ -381,7 +358,7 @@ def take(block: Block, step: Step) -> None:
     block.velocity += step.gained
     block.displacement += step.moved
     block.slip += abs(step.moved)
-    if block.phase != UP:
+    if block.side > 0.0:
         block.largest_velocity = max(block.largest_velocity, block.velocity)
     block.least_velocity = min(block.least_velocity, block.velocity)
     if block.phase == FOLLOWS:
@@ -463,7 +440,7 @@ def may_end(law: Law, block: Block, step: Step) -> bool:
         return True
     if block.phase == CONTINUOUS:
         return False
-    if velocity > 0.0 if block.phase == UP else velocity < 0.0:
+    if block.side * velocity < 0.0:
         return True
     if block.rises and block.phase == HELD:
         return excess(law, block, step.end, velocity, slip) > 0.0
@@ -472,9 +449,9 @@ def may_end(law: Law, block: Block, step: Step) -> bool:
 
 @scalar
 def ending_by(block: Block, step: Step, part: float) -> int:
-    """Return how the phase has ended after a part of a step: V has passed 0, the law has weakened."""
+    """Return how the phase has ended after a part of a step: by V = 0, or as the law weakened."""
     velocity = velocity_in_step(block.velocity, step, part)
-    if velocity > 0.0 if block.phase == UP else velocity < 0.0:
+    if block.side * velocity < 0.0:
         return STOPS
     if block.slip >= block.weakens_until:
         return GOES_ON
@@ -506,9 +483,8 @@ def change_in_step(law: Law, block: Block, step: Step) -> float:
 
 @inlined
 def has_not_begun(block: Block, step: Step) -> bool:
-    """Return whether a step from rest does not get away from it: only rounding has made it slide."""
-    stays = step.gained >= 0.0 if block.phase == UP else step.gained <= 0.0
-    return block.velocity == 0.0 and stays
+    """Return True if a step from rest does not leave it: only rounding has made it slide."""
+    return block.velocity == 0.0 and block.side * step.gained <= 0.0
 
 
 @scalar
@@ -620,35 +596,22 @@ def place_beyond(
 
 
 @scalar
-def wait_for_yield(law: Law, block: Block, piece: Piece, curves: np.ndarray, tau: float) -> float:
-    """Return τ at which Newmark's block at rest begins to slide: where Üg exceeds what it resists."""
-    down = resistance(law, block, 1.0, 0.0, block.slip)
-    up = resistance(law, block, -1.0, 0.0, block.slip) if block.slides_up else math.inf
-    block.yield_acceleration = down
-    ground = ground_at(block, piece, curves, tau)
-    last = block.amplitude * piece.last
-    if max(ground, last) > down:
-        block.phase = DOWN
-    elif min(ground, last) < -up:
-        block.phase = UP
-    else:
-        return piece.finish
-    side = 1.0 if block.phase == DOWN else -1.0
-    level = down if block.phase == DOWN else up
-    if side * ground <= level:
-        tau = max(tau, place_beyond(block, piece, curves, level, side))
-    begin_slide(block, piece, tau)
-    return tau
-
-
-@scalar
 def wait_for_eq4(
-    law: Law, block: Block, piece: Piece, curves: np.ndarray, tau: float, end: float
+    law: Law,
+    block: Block,
+    piece: Piece,
+    curves: np.ndarray,
+    tau: float,
+    until: float,
+    end: float,
 ) -> float:
     """Return τ at which the paper's block begins to slide while Üg rises beyond Üy: t1.
 
-    That is where Eq. 4 is below Üg; `end`, if that is not so at the end, either.
+    That is where Eq. 4 is below Üg.  If that is not so at the end of the step, either, it is `end`;
+    out of a pulse and on a fall it is `until`, and the block does not slide.
     """
+    if not block.in_pulse or not block.rises:
+        return until
     if block.amplitude * piece.last < block.yield_acceleration:
         return piece.finish
     ground = ground_at(block, piece, curves, tau)
@@ -743,7 +706,7 @@ def set_friction(block: Block, peak: float) -> Interface:
 
 @scalar
 def yield_governs(law: Law, block: Block, low: float, high: float) -> bool:
-    """Return whether Eq. 4 stays at or below Üy while Üg rises from low to high, but for the literal rise."""
+    """Return True if, with the monotone rise, Eq. 4 is at most Üy for Üg from low to high."""
     for j in range(POINTS_OF_RISE, -1, -1):
         ground = low + (high - low) * (j / POINTS_OF_RISE)
         if eq4_at(law, block, ground) > block.yield_acceleration:
@@ -804,7 +767,7 @@ def enter_piece(
         comes = False  # for good
     if not comes or highest < block.yield_acceleration:
         return math.inf
-    if not block.rises or law.is_strength:
+    if not block.rises or block.is_newmark:
         return piece.begin
     return place_beyond(block, piece, curves, block.yield_acceleration, 1.0)
 
@@ -894,12 +857,7 @@ def step_along(
         end = min(next_point, until)
         if block.phase == STUCK:
             first_rate = math.nan
-            if block.is_newmark:
-                tau = wait_for_yield(law, block, piece, curves, tau)
-            elif block.in_pulse and block.rises:
-                tau = wait_for_eq4(law, block, piece, curves, tau, end)
-            else:
-                tau = until
+            tau = law.wait(law, block, piece, curves, tau, until, end)
             continue
         if block.phase == ATTENUATES:
             attenuate(block, log, block.zero + tau, until - tau)

@@ -1,13 +1,14 @@
-"""Cells that are stepped (`kernels.step`): their blocks, cycle after cycle, their results and histories."""
+"""Cells that are stepped by `kernels.step`: their cycles, results and histories."""
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.jit.compiling import kernel
-from slipsweep.jit.decorators import registered, scalar, single
+from slipsweep.jit.decorators import inlined, registered, scalar, single
 from slipsweep.kernels.block import (
     FRICTION_ESTIMATED,
     LIMIT_UNDEFINED,
@@ -15,7 +16,6 @@ from slipsweep.kernels.block import (
     NEAR_MODE_LIMIT,
     NEWMARK,
     NO_VALUE,
-    NOT_AT_REST,
     STATICALLY_UNSTABLE,
     UPLIFT,
     UPSLOPE,
@@ -30,31 +30,28 @@ from slipsweep.kernels.step import (
     ATTENUATES,
     BLOCK,
     CONTINUOUS,
-    DOWN,
-    GROWTH_SHARE,
     LOG,
     SIMPSON,
     STUCK,
-    UP,
     Block,
     Law,
     Step,
     Steps,
     attenuate,
     end_positive_half_wave,
+    eq4_rate,
     moved_in_step,
-    resistance,
-    rest,
     set_friction,
     unlimited,
     velocity_in_step,
+    wait_for_eq4,
     walk,
     yield_governs,
 )
 from slipsweep.model import equations as eq
 from slipsweep.motion.paths import PIECE, TERMS, Path
 
-#: Parameters of strength that changes while the block slides (`kernels.strength`).
+#: Parameters of strength that changes while the block slides (`kernels.step_newmark`).
 STRENGTH_FIELDS = ("residual_mu", "weakening_distance", "fast_mu", "rate_constant")
 
 #: The cells that are stepped: a `Cell`, the yield acceleration upslope (NaN, if the block slides
@@ -122,8 +119,8 @@ def end_cycle(block: Block) -> None:
 def repetitions(law: Law, block: Block, left: int) -> int:
     """Return how often the next cycles of that shape, at most `left`, gain what the last one did.
 
-    They do so if they begin in the same state; and also with a larger V, if friction does not depend
-    on the motion and the block does not come to rest: then V is larger throughout by as much.  A
+    They do so if they begin in the same state; and also with a larger V, if friction does not
+    depend on the motion and the block does not come to rest: then V is larger throughout by as much.  A
     block that weakens with the slip is never in the same state.
     """
     weakens = block.cycle_slip < block.weakens_until
@@ -180,45 +177,15 @@ def walk_cycles(law: Law, block: Block, path: Path, steps: Steps, log: np.ndarra
 
 
 @scalar
-def run_out(block: Block, path: Path, log: np.ndarray) -> None:
+def run_out(law: Law, block: Block, path: Path, steps: Steps, log: np.ndarray) -> None:
     """After the shaking Eq. 12 takes V to 0, but that of continuous sliding under a waveform."""
     end_positive_half_wave(block)
     valueless = block.validity & NO_VALUE != 0
     if valueless or block.phase == STUCK or (block.phase == CONTINUOUS and not block.recorded):
         return
-    if block.phase == DOWN:
-        block.held = block.yield_acceleration
-    elif block.phase == UP:
-        block.held = block.upslope_yield_acceleration
     block.phase = ATTENUATES
     end = path.base.pieces[path.base.pieces.size - 1].end
     attenuate(block, log, end + 2.0 * math.pi * max(path.repeats - 1, 0), math.inf)
-
-
-@single
-def run_out_by_strength(law: Law, block: Block, path: Path, steps: Steps, log: np.ndarray) -> None:
-    """After the shaking the strength of Newmark's block takes V to 0, or never does.
-
-    A block that is at rest then, but too weak to stay there, has no value, either.
-    """
-    offset = 2.0 * math.pi * max(path.repeats - 1, 0)
-    p = path.base.pieces.size
-    block.onset = steps.pieces[p].start + offset
-    block.first_step = math.inf
-    while block.phase != STUCK and p < steps.pieces.size:
-        slip = block.slip
-        side = 1.0 if block.phase == DOWN else -1.0
-        braking = resistance(law, block, side, block.velocity, slip)
-        if braking <= 0.0 and slip >= block.weakens_until:
-            break
-        time_to_stop = abs(block.velocity / braking)
-        block.first_step = min(block.first_step, GROWTH_SHARE / block.steps * time_to_stop)
-        walk(law, block, path, steps, p, p + 1, offset, log)
-        if block.slip == slip:
-            rest(block)  # where the strength that is left is just what holds it
-        p += 1
-    if block.phase != STUCK or resistance(law, block, 1.0, 0.0, block.slip) < 0.0:
-        block.validity |= NOT_AT_REST
 
 
 # ------------------------------------------------------------------ a cell
@@ -237,7 +204,7 @@ def yield_governs_wave(law: Law, block: Block, path: Path) -> bool:
 
 @scalar
 def validity_before(block: Block, path: Path) -> int:
-    """Set friction and mode for the peak of the shaking; return the flags known before the motion."""
+    """Set friction and mode for the peak of the shaking; return the flags before the motion."""
     if not block.recorded:
         interface = set_friction(block, block.amplitude)
         if block.amplitude * path.highest > block.yield_acceleration:
@@ -277,6 +244,7 @@ def put_at_rest(law: Law, block: Block, cell: np.record, options: Options) -> No
     block.rise = options.rise
     block.recoupling = options.recoupling
     block.phase = STUCK
+    block.side = 1.0
     block.in_pulse = 0
     block.held = 0.0
     block.velocity = 0.0
@@ -344,14 +312,22 @@ def solve_cells(
             if not block.recorded and yield_governs_wave(law, block, path):
                 block.validity = without_estimates(block.validity | YIELD_GOVERNS)
             walk_cycles(law, block, path, steps, log)
-            if law.is_strength and block.is_newmark:
-                run_out_by_strength(law, block, path, steps, log)
-            else:
-                run_out(block, path, log)
+            law.run_out(law, block, path, steps, log)
         validity = settled(block.validity, block.displacement, peak)
         if block.slides_up:
             validity &= ~UPSLOPE  # no caution for a block that slides both ways
         write_results(block, mode, validity, results[:, j])
+
+
+@inlined
+def paper_law(
+    friction: Callable[..., float],
+    knows_motion: bool,
+    knows_slip: bool,
+    longest_step: Callable[..., float],
+) -> Law:
+    """Return the law of a block of the paper with a friction of its own."""
+    return Law(friction, knows_motion, knows_slip, longest_step, eq4_rate, wait_for_eq4, run_out)
 
 
 @kernel
@@ -369,7 +345,7 @@ def solve_steps(
     `cells` are of dtype `STEP_CELL`; `blocks`, (1,), says how they are stepped (`blocks_of`); `log`
     is of dtype `LOG`, empty if no history is asked for; `results` is (`block.RESULTS`, cells).
     """
-    law = Law(exponential_friction, False, False, False, unlimited)
+    law = paper_law(exponential_friction, False, False, unlimited)
     solve_cells(law, cells, options, path, blocks, steps, log, results)
 
 

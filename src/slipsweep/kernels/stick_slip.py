@@ -273,7 +273,7 @@ def place_of(block: Block, base: Base, x: float, place: Place, last: int) -> Pla
     return Place(p, max(tau, offset_at(piece, curve, block.amplitude, x)))
 
 
-@single
+@scalar
 def rise(
     block: Block,
     base: Base,

@@ -187,8 +187,8 @@ class Step(Choice):
 
     name: ClassVar[str] = "step"
     rule: Rule = option("rule of the steps; orders 1, 2 and 4", "trapezoid")
-    # by default the trapezoid's median error is 1e-5 (docs/speed.md); the most is what any accuracy
-    # needs, and more
+    # with the default the median error of the trapezoid is 1e-5 (docs/speed.md); no accuracy needs
+    # the largest number
     steps_per_cycle: int = option("steps in a cycle", 1024, least=8, most=16_777_216)
 
     def check(self) -> None:

@@ -2,13 +2,14 @@
 
 All that mention a parameter take it from its row in `PARAMETER_TABLE`:
 
-- the signatures of `sweep`, `sample`, `simulate`, `limit_amplitude` and `required_strength`: names
-  and order (`tests/model/test_parameter_table.py`), and the text in their docstrings
+- the signatures of `sweep`, `sample`, `simulate`, `limit_amplitude` and others: names and
+  order (`tests/model/test_parameter_table.py`), and the text in their docstrings
   (`model/docstrings.py`);
 - `model/parameters.py`: the bounds and the unit that a value is converted to;
 - `model/variables.py`: the attributes of coordinates, and which inputs go together;
 - `files/spec.py`: the keys of the tables [axes], [[cases]], [model] and [uncertainty];
 - `cli/options.py`: the options of the command line, with their help;
+- `charts/style.py`: the symbols in figures;
 - `docs/sweep-files.md`: units and bounds (`tests/test_readme.py`).
 
 The rows stand in the order in which a result has its dimensions.  Nothing here imports NumPy, so
@@ -450,7 +451,7 @@ class Quantity(NamedTuple):
 _RAMP = Quantity(None, Bound(0.0, MOST_RAMP, f"0 to {MOST_RAMP}", f"0 to {MOST_RAMP}"))
 _SHARE = Bound(_ABOVE_0, _BELOW_1, "a number between 0 and 1", "between 0 and 1")
 
-#: What else is given and has bounds: targets, options of choices, settings.
+#: Other numbers with bounds: targets, options of choices, settings.
 QUANTITIES = {
     "displacement": Quantity("m", POSITIVE),
     "threshold": Quantity("m", NOT_NEGATIVE),

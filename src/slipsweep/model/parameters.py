@@ -29,8 +29,8 @@ GRAVITY = 9.81
 #: the kernels, which have 64 bits, can count.
 MOST_CYCLES = MOST_POINTS = 1_000_000_000
 
-#: What each parameter, and each other number that is given, may be (MODEL: what no physics allows
-#: is an error, not a NaN).  Polarities are checked by themselves (`grid/inputs.py`).
+#: Bounds of each parameter and of other numbers.  A value that physics does not allow is an error,
+#: not a NaN.  Polarities are checked in `grid/inputs.py`.
 BOUNDS: dict[str, Bound] = {
     **{row.name: row.bound for row in PARAMETER_TABLE if row.name != "polarity"},
     **{name: quantity.bound for name, quantity in QUANTITIES.items()},

@@ -163,7 +163,7 @@ def flags_of(kind: FlagKind) -> Validity:
 
 VALUELESS, CAUTIONS, NOTES = (flags_of(kind) for kind in FlagKind)
 
-#: Flags of blocks without a value that slide for good: their displacement exceeds every length.
+#: Flags of blocks without a value that never stop: their displacement exceeds every length.
 ENDLESS = Validity.STATICALLY_UNSTABLE | Validity.NOT_AT_REST
 
 
@@ -307,7 +307,7 @@ EXTREMES: dict[str, dict[str, Any]] = {
     ),
 }
 
-#: Results of Newmark's block that slides both ways, not of others; the last on request.
+#: Results of Newmark's block that slides both ways only; the last of them on request.
 BOTH_WAYS: dict[str, dict[str, Any]] = {
     **EXTREMES,
     "clearance": _cf("m", "clearance, largest less smallest displacement over time", "validity"),
@@ -354,8 +354,8 @@ LIMIT_RESULTS: dict[str, dict[str, Any]] = {
     ),
 }
 
-#: Results of a record, further to the displacement, the velocity and the validity: -1 where there
-#: is no value.
+#: Further results under a record, beside displacement, velocity and validity; -1 where there is no
+#: value.
 RECORD_COUNTS: dict[str, dict[str, Any]] = {
     "number_of_slips": _cf("1", "number of slips that begin at rest", "validity"),
     "stick_slip_pulses": _cf("1", "number of pulses in stick-slip mode", "validity"),
@@ -390,11 +390,10 @@ MOTION_COORDINATES: dict[str, dict[str, Any]] = {
     **{f"motion_{name}": about for name, about in INTENSITY_MEASURES.items()},
 }
 
-#: Of them, long texts, that no table repeats in every row: `slipsweep info` and the file itself
-#: tell them.
+#: Those with long texts, which tables leave out; `slipsweep info` and the file itself have them.
 MOTION_FILES = ("motion_file", "motion_sha256")
 
-#: The record itself, in the files of results: what is read back to repeat a run.
+#: Samples of a record, stored in files of results so that a run can be repeated.
 RECORD_SAMPLES: dict[str, dict[str, Any]] = {
     "record_time": _cf("s", "time of a sample of the record"),
     "record_acceleration": _cf(
@@ -404,7 +403,7 @@ RECORD_SAMPLES: dict[str, dict[str, Any]] = {
     ),
 }
 
-#: Coordinates of the statistics of `sample`, further to the parameters.
+#: Coordinates of the statistics of `sample`, beside the parameters.
 STATISTIC_COORDINATES: dict[str, dict[str, Any]] = {
     "quantile": _cf("1", "share of the samples with a value that lies below"),
     "threshold": _cf("m", "displacement to exceed"),
@@ -442,8 +441,7 @@ STATISTICS: dict[str, dict[str, Any]] = {
     ),
 }
 
-#: Statistics over the motions of a suite; all but counts and shares are of the motions that have a
-#: value.
+#: Statistics over the motions of a suite.  All but counts and shares are of motions with a value.
 SUITE_STATISTICS: dict[str, dict[str, Any]] = {
     "value_count": _cf("1", "number of motions with a value"),
     "valueless_count": _cf("1", "number of motions without a value"),
@@ -511,8 +509,8 @@ def counted(about: Mapping[str, Any], attributes: Mapping[Any, Any]) -> dict[str
     return {**about, "long_name": counted_text(str(about["long_name"]), attributes)}
 
 
-#: The mean annual rate at which a displacement is exceeded, and its parts that lie outside of the
-#: grid's amplitudes.
+#: The mean annual rate of exceeding a displacement, and its parts outside of the amplitudes of the
+#: grid.
 HAZARD_RESULTS: dict[str, dict[str, Any]] = {
     "annual_rate": _cf(
         "year-1",
@@ -531,7 +529,7 @@ HAZARD_RESULTS: dict[str, dict[str, Any]] = {
     "valueless_share": _cf("1", "largest share of the motions without a value at any amplitude"),
 }
 
-#: What published equations add to statistics and annual rates.
+#: Further variables of statistics and annual rates by published equations.
 PUBLISHED_RESULTS: dict[str, dict[str, Any]] = {
     "in_range": {
         "long_name": "whether the inputs lie in the range of the equation",
@@ -559,7 +557,7 @@ RESULT_DTYPES: dict[str, str] = {
 #: Displacements that may be negative where a block slides both ways.
 SIGNED = ("permanent_displacement", *EXTREMES)
 
-#: What `sweep` returns where no variables are named; of a suite also the factor on each motion.
+#: Default results of `sweep`; under a suite also the factor on each motion.
 DEFAULT_RESULTS = ("permanent_displacement", "peak_relative_velocity", "sliding_mode", "validity")
 DEFAULT_RECORD_RESULTS = (
     "permanent_displacement",
@@ -587,7 +585,7 @@ HISTORY: dict[str, dict[str, Any]] = {
     "relative_displacement": _cf("m", "relative displacement of the block", comment=_DIRECTION),
 }
 
-#: The positive half waves of the record that a time history is of, along `half_wave`.
+#: Positive half waves of the record of a time history, along `half_wave`.
 HALF_WAVES: dict[str, dict[str, Any]] = {
     "half_wave_start": _cf("s", "time at which the acceleration of the base rises through zero"),
     "half_wave_end": _cf("s", "time at which it falls through zero"),
@@ -598,14 +596,14 @@ HALF_WAVES: dict[str, dict[str, Any]] = {
     ),
 }
 
-#: What Eq. 1 makes of a test on a shaking table, along time.
+#: Friction that a test on a shaking table measured, along time (`measured_friction`).
 MEASURED_FRICTION: dict[str, dict[str, Any]] = {
     "friction_coefficient": _cf("1", "friction coefficient by Eq. 1"),
     "friction_ratio": _cf("1", "friction coefficient by Eq. 1 over the static one"),
     "free_body_friction": _cf("1", "friction coefficient by statics; at rest the mobilised one"),
 }
 
-#: The slides that a test shows.
+#: Slides in a test, along `slide`.
 SLIDES: dict[str, dict[str, Any]] = {
     "slide_onset": _cf("s", "time at which a slide begins"),
     "slide_peak": _cf("s", "time of the largest table acceleration within a slide"),
@@ -617,7 +615,7 @@ SLIDES: dict[str, dict[str, Any]] = {
     "slide_free_body_friction": _cf("1", "median friction coefficient by statics within a slide"),
 }
 
-#: Results of `calibrate` that have no other name here.
+#: Further results of `calibrate`.
 CALIBRATION: dict[str, dict[str, Any]] = {
     "correlation": _cf("1", "correlation of two parameters as estimated"),
     "cycle_start": _cf("s", "time at which a cycle begins"),
@@ -633,7 +631,7 @@ CALIBRATION: dict[str, dict[str, Any]] = {
     },
 }
 
-#: What was measured, and what is computed with the parameters found, along time.
+#: Series of a test, measured, and computed with the calibrated parameters, along time.
 CALIBRATION_SERIES: dict[str, dict[str, Any]] = {
     f"{kind}_{name}": {**about, "long_name": f"{kind} {about['long_name']}"}
     for kind in ("measured", "computed")

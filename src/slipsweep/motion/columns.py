@@ -24,7 +24,7 @@ _RATE = (
     rf"[^=:\n\d]*[=:]?\s*{_STEP}"
 )
 
-#: Names of a first column: times, and what else increases from line to line.
+#: Names of a first column: of times, and of other numbers that increase from line to line.
 _TIME = r"(?:t|time|zeit|tiempo|temps|tempo|zaman)\b"
 _NO_TIME = r"(?:period\w*|freq\w*|f|n|no|nr|num\w*|sample\w*|index|point\w*|step|count|i)\b"
 

@@ -270,7 +270,7 @@ def _cosmos_channel(lines: list[str], at: int) -> Samples | None:
     at += 1 + int(*head("number of comment lines", rf"^\s*{COUNT}\s+Comment line"))
     data = at
     at, values = section("number and format of values", _COSMOS_DATA)
-    # what a V2 file may have behind the acceleration is its velocity and displacement
+    # a V2 file may have velocity and displacement after the acceleration
     if not any(line.lstrip().lower().startswith("end-of-data") for line in lines[at:]):
         raise InputError("no line End-of-data after the values: cut off, or damaged")
     if whole[0] == 3:

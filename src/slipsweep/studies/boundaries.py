@@ -9,13 +9,13 @@ import xarray as xr
 
 from slipsweep.model.options import Mendez
 from slipsweep.model.variables import Validity, has_signed_displacements
-from slipsweep.studies.datasets import friction_parameters
 from slipsweep.studies.solved_again import (
     INTERFACE,
     is_newmark,
     is_recorded,
     without_coordinates,
 )
+from slipsweep.studies.sweeps import friction_parameters
 from slipsweep.studies.upslope import upslope_yield_acceleration
 
 

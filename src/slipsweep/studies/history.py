@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.grid import engine, plans, resources, solvers
-from slipsweep.grid import inputs as grid_inputs
+from slipsweep.grid.inputs import Problem, check_problem, given_inputs
 from slipsweep.kernels import step, step_cells
 from slipsweep.kernels.block import RESULTS
 from slipsweep.kernels.history import History
-from slipsweep.model import equations as eq
-from slipsweep.model import options, parameters, variables
+from slipsweep.model import equations, options, parameters, variables
 from slipsweep.model.docstrings import with_parameters
 from slipsweep.model.variables import HISTORY
 from slipsweep.motion import cutting
@@ -25,12 +24,12 @@ from slipsweep.motion.paths import values_at
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import Waveform
-from slipsweep.studies import datasets
+from slipsweep.studies.sweeps import Excitation, naming_choices
 
 Floats = NDArray[np.float64]
 
 
-@datasets.naming_choices
+@naming_choices
 @with_parameters
 def simulate(
     theta: float | None = None,
@@ -38,7 +37,7 @@ def simulate(
     amplitude: float | None = None,
     frequency: float | None = None,
     *,
-    excitation: datasets.Excitation = "sine",
+    excitation: Excitation = "sine",
     model: options.Model | str = "mendez",
     solver: options.Solver | str = "auto",
     phi: float | None = None,
@@ -110,8 +109,8 @@ def simulate(
     >>> print(f"{mm:.0f} mm after {history.time.values[-1]:.2f} s")
     331 mm after 2.78 s
     """
-    inputs = grid_inputs.given_inputs(locals())
-    problem = grid_inputs.check_problem(excitation, model, solver)
+    inputs = given_inputs(locals())
+    problem = check_problem(excitation, model, solver)
     motion = problem.excitation
     if isinstance(motion, Suite):
         one_motion = f"suite[{motion.labels[0]!r}]{'.rotated(azimuth)' if motion.has_pairs else ''}"
@@ -156,7 +155,7 @@ class _History:
     """
 
     def __init__(
-        self, problem: grid_inputs.Problem, inputs: Mapping[str, xr.Variable], summary: xr.Dataset
+        self, problem: Problem, inputs: Mapping[str, xr.Variable], summary: xr.Dataset
     ) -> None:
         self.problem = problem
         self.inputs = inputs
@@ -206,7 +205,7 @@ class _History:
         log = self._logged()
         table[0] = self.fields["amplitude"] * values_at(self.path, phases)
         table[1], table[3], table[4] = step_cells.samples_of(log, phases, table[0])
-        table[2] = eq.mobilised_friction(
+        table[2] = equations.mobilised_friction(
             table[0],
             table[1],
             self.fields.get("mu_s", math.nan),

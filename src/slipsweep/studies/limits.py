@@ -29,8 +29,8 @@ from slipsweep.model.docstrings import with_parameters
 from slipsweep.model.variables import LimitStatus, Validity
 from slipsweep.motion.cutting import wave_of_record
 from slipsweep.motion.records import Record
-from slipsweep.studies import datasets, limited_displacement
-from slipsweep.studies.datasets import Values
+from slipsweep.studies import limited_displacement
+from slipsweep.studies.sweeps import Excitation, Signs, Values, brought_coordinates, naming_choices
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -58,7 +58,7 @@ SCANNED = 2_000_000
 _AFTER_SCAN = ("frequency", "time_scale", "structure_frequency", "displacement")
 
 
-@datasets.naming_choices
+@naming_choices
 @with_parameters
 def limit_amplitude(
     displacement: Values | str | Sequence[str],
@@ -66,7 +66,7 @@ def limit_amplitude(
     mu_s: Values | None = None,
     frequency: Values | None = None,
     *,
-    excitation: datasets.Excitation = "sine",
+    excitation: Excitation = "sine",
     model: options.Model | str = "mendez",
     phi: Values | None = None,
     yield_acceleration: Values | None = None,
@@ -82,7 +82,7 @@ def limit_amplitude(
     rate_constant: Values | None = None,
     structure_frequency: Values | None = None,
     time_scale: Values | None = None,
-    polarity: datasets.Signs | None = None,
+    polarity: Signs | None = None,
     azimuth: Values | None = None,
     maximum_amplitude: float | None = None,
     amplitude_steps: int = AMPLITUDE_STEPS,
@@ -156,9 +156,7 @@ def limit_amplitude(
         maximum_amplitude=maximum_amplitude,
         amplitude_steps=amplitude_steps,
     )
-    return plan.solve(progress).assign_coords(
-        datasets.brought_coordinates(inputs, plan.coords, plan.names)
-    )
+    return plan.solve(progress).assign_coords(brought_coordinates(inputs, plan.coords, plan.names))
 
 
 def plan_limits(

@@ -19,7 +19,6 @@ from slipsweep.model.variables import (
 )
 from slipsweep.motion.waveforms import peak_acceleration
 from slipsweep.published import EQUATIONS, INPUTS, Estimate, check_equations
-from slipsweep.studies.datasets import friction_parameters
 from slipsweep.studies.sampling import Thresholds, check_increasing, check_thresholds
 from slipsweep.studies.suite_statistics import (
     QUANTILES,
@@ -28,6 +27,7 @@ from slipsweep.studies.suite_statistics import (
     labels_along,
     suite_statistics,
 )
+from slipsweep.studies.sweeps import friction_parameters
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,17 +9,24 @@ import xarray as xr
 
 from slipsweep.errors import InputError
 from slipsweep.grid import chunks, plans, resources, solvers
-from slipsweep.grid import inputs as grid_inputs
 from slipsweep.grid.engine import Request
+from slipsweep.grid.inputs import (
+    Inputs,
+    Problem,
+    check_problem,
+    given_inputs,
+    grid_sizes,
+    inputs_of,
+)
 from slipsweep.model import options, parameters, variables
 from slipsweep.model.docstrings import with_parameters
 from slipsweep.model.variables import StrengthStatus
-from slipsweep.studies import datasets, limited_displacement
-from slipsweep.studies.datasets import Values
+from slipsweep.studies import limited_displacement
 from slipsweep.studies.limits import check_displacement
 from slipsweep.studies.required_yield import SCAN_MEMORY, yield_accelerations
 from slipsweep.studies.sampling import Floats, Sampling, check_increasing
 from slipsweep.studies.suite_statistics import QUANTILES, SUITE, THRESHOLDS
+from slipsweep.studies.sweeps import Excitation, Signs, Values, brought_coordinates, naming_choices
 from slipsweep.studies.uncertainty import check_drawn
 
 TITLE = "Strength that is required for a tolerable displacement"
@@ -41,7 +48,7 @@ _CELL_MEMORY = 300
 _DRAW = "draw of the uncertain inputs"
 
 
-@datasets.naming_choices
+@naming_choices
 @with_parameters
 def required_strength(
     displacement: Values | str | Sequence[str],
@@ -49,7 +56,7 @@ def required_strength(
     frequency: Values | None = None,
     *,
     of: str = "yield_coefficient",
-    excitation: datasets.Excitation = "sine",
+    excitation: Excitation = "sine",
     model: options.Model | str = "newmark",
     theta: Values | None = None,
     displacement_amplitude: Values | None = None,
@@ -58,7 +65,7 @@ def required_strength(
     pgv: Values | None = None,
     arias_intensity: Values | None = None,
     time_scale: Values | None = None,
-    polarity: datasets.Signs | None = None,
+    polarity: Signs | None = None,
     azimuth: Values | None = None,
     uncertain: Mapping[str, Any] | None = None,
     samples: int = 4096,
@@ -133,7 +140,7 @@ def required_strength(
     >>> design.required_yield_coefficient_quantile.sel(quantile=0.84).values.round(3)
     array([0.089, 0.206])
     """
-    inputs = grid_inputs.given_inputs(locals())
+    inputs = given_inputs(locals())
     chosen = options.MODELS.of(model)
     sampling = None
     if uncertain is not None:
@@ -157,14 +164,12 @@ def required_strength(
         quantiles=quantiles,
     )
     taken = {*variables.REQUIRED_RESULTS, *variables.STATISTIC_COORDINATES}
-    return plan.solve(progress).assign_coords(
-        datasets.brought_coordinates(inputs, plan.coords, taken)
-    )
+    return plan.solve(progress).assign_coords(brought_coordinates(inputs, plan.coords, taken))
 
 
 def plan_strength(
     displacement: Any,
-    inputs: grid_inputs.Inputs,
+    inputs: Inputs,
     *,
     of: Any = "yield_coefficient",
     excitation: Any = "sine",
@@ -175,7 +180,7 @@ def plan_strength(
     """Return the plan of `required_strength`; same parameters and errors."""
     of = parameters.check_choice("of", of, variables.REQUIRED_STRENGTHS)
     options.check_constant_strength("a required strength", options.MODELS.of(model))
-    problem = grid_inputs.check_problem(excitation, model, "cycle")
+    problem = check_problem(excitation, model, "cycle")
     if not isinstance(problem.model, options.Newmark):
         raise InputError(
             f"model = {problem.model.name!r}: must be 'newmark' for a required strength: by the "
@@ -228,7 +233,7 @@ class StrengthPlan(plans.Plan):
     def __init__(
         self,
         of: str,
-        problem: grid_inputs.Problem,
+        problem: Problem,
         coords: dict[str, xr.Variable],
         attrs: dict[str, Any],
         sampling: Sampling | None,
@@ -238,12 +243,12 @@ class StrengthPlan(plans.Plan):
         self.problem = problem
         self.sampling = sampling
         self.quantiles = quantiles if sampling is None else sampling.quantiles
-        self.inputs = grid_inputs.inputs_of(problem, coords)
+        self.inputs = inputs_of(problem, coords)
         if "displacement_amplitude" in self.inputs or (
             sampling is not None and "displacement_amplitude" in sampling.distributions
         ):
             self.inputs.pop("amplitude", None)  # A = ω²d
-        sizes = grid_inputs.grid_sizes(self.inputs)
+        sizes = grid_sizes(self.inputs)
         over = () if sampling is None else sampling.over
         for dim in over:
             if dim not in sizes:

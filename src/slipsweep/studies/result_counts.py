@@ -12,8 +12,8 @@ from slipsweep.errors import InputError
 from slipsweep.grid.chunks import CHUNK_CELLS, grid_chunks
 from slipsweep.model.variables import SensitivityStatus, SlidingMode, Validity
 
-#: Number of classes of ratios, and the ratios at their ends.  All classes have the same width in the
-#: logarithm of the ratio, 0.1 %.
+#: Number of classes of ratios, and the ratios at their ends.  All classes have the same width in
+#: the logarithm of the ratio, 0.1 %.
 _CLASSES = 32_000
 _LEAST = 1e-7
 _LARGEST = 1e7

@@ -22,7 +22,7 @@ from slipsweep.model.options import (
 )
 from slipsweep.model.variables import PARAMETERS, RECORD_INPUTS, STRENGTH_INPUTS, WAVEFORM_INPUTS
 from slipsweep.motion.waveforms import WAVEFORMS, peak_acceleration
-from slipsweep.studies.datasets import sweep
+from slipsweep.studies.sweeps import sweep
 
 #: Amplitudes of a motion.
 DRIVES = ("amplitude", "displacement_amplitude")

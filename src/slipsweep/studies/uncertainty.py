@@ -16,12 +16,19 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.grid import chunks, engine, plans, resources, solvers, threads
-from slipsweep.grid import inputs as grid_inputs
+from slipsweep.grid.inputs import (
+    Inputs,
+    Problem,
+    check_problem,
+    given_inputs,
+    grid_sizes,
+    inputs_of,
+)
 from slipsweep.model import options, parameters, variables
 from slipsweep.model.docstrings import with_parameters
 from slipsweep.motion.waveforms import Waveform
-from slipsweep.studies import datasets
 from slipsweep.studies.sampling import ENDS, SOBOL_MEMORY, Sampling, Thresholds, sobol_indices
+from slipsweep.studies.sweeps import Excitation, Signs, Values, brought_coordinates, naming_choices
 
 TITLE = "Permanent displacement of a rigid block under uncertain inputs"
 
@@ -58,37 +65,37 @@ _TAKEN = {*variables.STATISTICS, *variables.STATISTIC_COORDINATES}
 _DRAW = "draw of the uncertain inputs"
 
 
-@datasets.naming_choices
+@naming_choices
 @with_parameters
 def sample(
-    theta: datasets.Values | None = None,
-    mu_s: datasets.Values | None = None,
-    amplitude: datasets.Values | None = None,
-    frequency: datasets.Values | None = None,
+    theta: Values | None = None,
+    mu_s: Values | None = None,
+    amplitude: Values | None = None,
+    frequency: Values | None = None,
     *,
     uncertain: Mapping[str, Any],
-    excitation: datasets.Excitation = "sine",
+    excitation: Excitation = "sine",
     model: options.Model | str = "mendez",
     solver: options.Solver | str = "auto",
-    phi: datasets.Values | None = None,
-    displacement_amplitude: datasets.Values | None = None,
-    yield_acceleration: datasets.Values | None = None,
-    yield_coefficient: datasets.Values | None = None,
-    upslope_yield_acceleration: datasets.Values | None = None,
-    decay_rate: datasets.Values | None = None,
-    delta_mu: datasets.Values | None = None,
-    minimum_friction: datasets.Values | None = None,
-    residual_mu: datasets.Values | None = None,
-    residual_phi: datasets.Values | None = None,
-    weakening_distance: datasets.Values | None = None,
-    fast_mu: datasets.Values | None = None,
-    rate_constant: datasets.Values | None = None,
-    scale: datasets.Values | None = None,
-    pgv: datasets.Values | None = None,
-    arias_intensity: datasets.Values | None = None,
-    time_scale: datasets.Values | None = None,
-    polarity: datasets.Signs | None = None,
-    azimuth: datasets.Values | None = None,
+    phi: Values | None = None,
+    displacement_amplitude: Values | None = None,
+    yield_acceleration: Values | None = None,
+    yield_coefficient: Values | None = None,
+    upslope_yield_acceleration: Values | None = None,
+    decay_rate: Values | None = None,
+    delta_mu: Values | None = None,
+    minimum_friction: Values | None = None,
+    residual_mu: Values | None = None,
+    residual_phi: Values | None = None,
+    weakening_distance: Values | None = None,
+    fast_mu: Values | None = None,
+    rate_constant: Values | None = None,
+    scale: Values | None = None,
+    pgv: Values | None = None,
+    arias_intensity: Values | None = None,
+    time_scale: Values | None = None,
+    polarity: Signs | None = None,
+    azimuth: Values | None = None,
     samples: int = 4096,
     method: str = "sobol",
     seed: int = 0,
@@ -187,7 +194,7 @@ def sample(
     >>> result.displacement_quantile.sel(quantile=0.5).round(3).values
     array([0.   , 0.265])
     """
-    inputs = grid_inputs.given_inputs(locals())
+    inputs = given_inputs(locals())
     sampling = Sampling(
         uncertain,
         samples=samples,
@@ -201,15 +208,15 @@ def sample(
         g=options.MODELS.of(model).g,
     )
     plan = plan_samples(sampling, inputs, excitation=excitation, model=model, solver=solver)
-    coords = datasets.brought_coordinates(inputs, plan.coords, _TAKEN)
+    coords = brought_coordinates(inputs, plan.coords, _TAKEN)
     return plan.solve(progress).assign_coords(coords).drop_dims(sampling.over, errors="ignore")
 
 
 def plan_samples(
-    sampling: Sampling, inputs: grid_inputs.Inputs, *, excitation: Any, model: Any, solver: Any
+    sampling: Sampling, inputs: Inputs, *, excitation: Any, model: Any, solver: Any
 ) -> "SamplePlan":
     """Return the plan of the samples of a grid, drawn and checked; errors as of `sample`."""
-    problem = grid_inputs.check_problem(excitation, model, solver)
+    problem = check_problem(excitation, model, solver)
     check_drawn(sampling, tuple(inputs), problem)
     drawn = sampling.distributions
     absolute = [name for name, distribution in drawn.items() if distribution.kind == "absolute"]
@@ -238,9 +245,7 @@ def plan_samples(
     return SamplePlan(sampling, problem, coords, attrs)
 
 
-def check_drawn(
-    sampling: Sampling, given_names: Sequence[str], problem: grid_inputs.Problem
-) -> None:
+def check_drawn(sampling: Sampling, given_names: Sequence[str], problem: Problem) -> None:
     """Raise InputError for draws that cannot be used.
 
     They are draws of a parameter that the model or the shaking does not have, that is given as
@@ -295,7 +300,7 @@ def _check_pooled(
 
 def _obeys_scaling_law(
     sampling: Sampling,
-    problem: grid_inputs.Problem,
+    problem: Problem,
     coords: Mapping[str, xr.Variable],
     clock: str,
 ) -> bool:
@@ -321,7 +326,7 @@ class SamplePlan(plans.Plan):
     def __init__(
         self,
         sampling: Sampling,
-        problem: grid_inputs.Problem,
+        problem: Problem,
         coords: dict[str, xr.Variable],
         attrs: dict[str, Any],
     ) -> None:
@@ -332,20 +337,20 @@ class SamplePlan(plans.Plan):
         if not is_wave:
             del self.results["mode_share"]
         clock = "frequency" if is_wave else "time_scale"
-        inputs = grid_inputs.inputs_of(problem, coords)
+        inputs = inputs_of(problem, coords)
         for angle in variables.ANGLES:
             if angle in coords and angle in drawn:
                 inputs[angle] = coords[angle]
         if "displacement_amplitude" in {*inputs, *drawn}:
             inputs.pop("amplitude", None)  # A = ω²d
-        sizes = grid_inputs.grid_sizes(inputs)
+        sizes = grid_sizes(inputs)
         plans.check_dimensions(sizes, coords, _TAKEN)
         _check_pooled(sampling, sizes, coords.get(clock), clock)
         pooled = {dim: sizes[dim] for dim in sampling.over}
         points = {dim: size for dim, size in sizes.items() if dim not in pooled}
         # the dimensions of the grid that the samples depend on
         scaling = _obeys_scaling_law(sampling, problem, coords, clock)
-        dims = grid_inputs.grid_sizes(
+        dims = grid_sizes(
             {name: values for name, values in inputs.items() if name != clock or not scaling}
         )
         scaled = {dim: size for dim, size in points.items() if dim not in dims}
@@ -522,7 +527,7 @@ class SamplePlan(plans.Plan):
         for name in (estimated for estimated in _ESTIMATED if estimated in drawn):
             # Coulomb's yield acceleration does not depend on the amplitude, which a record lacks
             every = {"amplitude": xr.Variable((), 0.0), **inputs}
-            request = engine.Request(self.problem, grid_inputs.grid_sizes(every), every, (name,))
+            request = engine.Request(self.problem, grid_sizes(every), every, (name,))
             estimate = engine.friction_parameters(request, finite=False)[name]
             values = self.sampling.distributions[name].applied(estimate, drawn[name])
             # where the estimate fails, NaN lets the kernel estimate it and raise the flag

@@ -125,7 +125,8 @@ MOST_STEPS = 32
 @inlined
 def load(cells: np.ndarray, first: int, batch: Batch) -> None:
     """Fill a batch with cells, from the `first` on; NaN stands for "by default"."""
-    batch.used = min(WIDTH, cells.size - first)
+    rest = cells.size - first
+    batch.used = rest if rest < WIDTH else WIDTH
     for j in range(batch.used):
         batch.tan_theta[j] = cells[first + j].tan_theta
         batch.mu_s[j] = cells[first + j].mu_s

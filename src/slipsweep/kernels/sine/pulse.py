@@ -148,7 +148,7 @@ def fall(batch: Batch, options: Options) -> None:
     V at t5 is V + A − b π/2.  V is largest, V₀, at Üg = b, ψ₀, and below the parabola V₀ − ½ A sin
     ψ₀ (ψ − ψ₀)² from there up to t5.  Beyond t5, χ = ψ − π/2, it is V − b χ − A vers χ, and vers χ
     ≥ 2 χ²/π².  The zeros of the parabola, and of that with 2 χ²/π², are beyond the stop: there the
-    iteration starts. docs/numerics.md#stop
+    iteration starts, or at χ = π/2, where V bends. docs/numerics.md#stop
     """
     eq12 = options.recoupling != INTEGRATE
     missing = 0
@@ -174,7 +174,7 @@ def fall(batch: Batch, options: Options) -> None:
             longest = max(at_t5, 0.0) / held
             curvature = amplitude / held * (4.0 / (math.pi * math.pi))
             after_t5 = HALF_PI + min(
-                2.0 * longest / (1.0 + math.sqrt(1.0 + 2.0 * curvature * longest)), math.pi
+                2.0 * longest / (1.0 + math.sqrt(1.0 + 2.0 * curvature * longest)), HALF_PI
             )
             beyond = HALF_PI if eq12 else after_t5
             stop = beyond if at_t5 > 0.0 else before_t5

@@ -1,7 +1,7 @@
 """Calibration: friction measured on a shaking table, and the parameters of the model from it.
 
 A test records the acceleration of the table and the acceleration, velocity or displacement of the
-block on it (`motion/shaking.py` reads it).  Two functions start from a test:
+block on it.  Two functions start from a test:
 
 - `measured_friction` computes without a model.  It gives the friction coefficient over time by
   Eq. 1 and by statics, and the slides that the block made.
@@ -20,6 +20,7 @@ measured coverage.
 In the order in which a test passes through them:
 
 ========================  =========================================================================
+shaking_test.py           a test as it is read from a CSV file, and its channels
 measured_friction.py      `measured_friction`; Eq. 1, statics, slides and their threshold
 noise.py                  noise of sensors: size, colour, steps of converters, clipped channels
 table_motion.py           the motion of the table behind its record: a spline, and its errors

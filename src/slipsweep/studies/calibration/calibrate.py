@@ -9,7 +9,7 @@ from threadpoolctl import threadpool_limits
 
 from slipsweep.errors import InputError
 from slipsweep.model import options, parameters, variables
-from slipsweep.motion.shaking import TABLE
+from slipsweep.model.docstrings import with_parameters
 from slipsweep.studies.calibration import findings
 from slipsweep.studies.calibration.corrected import (
     added_by_sensors,
@@ -34,12 +34,14 @@ from slipsweep.studies.calibration.measured_friction import (
     test_of,
 )
 from slipsweep.studies.calibration.observation import SOUGHT, Observation, runs_of
+from slipsweep.studies.calibration.shaking_test import TABLE
 
 #: Least peak of a cycle, in parts of the largest acceleration of the table, and fewest samples.
 _LEAST_CYCLE = 0.1
 _FEWEST_IN_A_CYCLE = 12
 
 
+@with_parameters
 def calibrate(
     test: Test | Sequence[Test],
     theta: float,
@@ -65,9 +67,6 @@ def calibrate(
         As for `measured_friction`, but of the block any one or more of `block_acceleration` (m/s²),
         `relative_velocity` (m/s) and `relative_displacement` (m), downslope positive; NaN or a
         blank cell where there is no sample. Several tests of one interface are calibrated together.
-    theta, mu_s, phi : float
-        Inclination of the base, degrees, and static friction coefficient, or its angle, degrees:
-        mu_s = tan phi.
     model : Mendez or str
         The rules of motion.
     offset, drift : str or list of str

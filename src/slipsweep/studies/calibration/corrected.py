@@ -7,7 +7,6 @@ import numpy as np
 import xarray as xr
 
 from slipsweep.model import variables
-from slipsweep.motion.shaking import TABLE, ShakingTest
 from slipsweep.studies.calibration.estimate import Solution
 from slipsweep.studies.calibration.measured_friction import (
     NOISE_IN_THRESHOLD,
@@ -16,6 +15,7 @@ from slipsweep.studies.calibration.measured_friction import (
     slides_of,
     threshold_of,
 )
+from slipsweep.studies.calibration.shaking_test import TABLE, ShakingTest
 
 
 def corrected_channels(solution: Solution) -> dict[str, Floats]:

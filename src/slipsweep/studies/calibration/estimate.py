@@ -192,7 +192,7 @@ class Fit(NamedTuple):
 
     @property
     def readings(self) -> set[str]:
-        """What decides the acceleration of the block at the points that the data allow."""
+        """Readings of the model (`Scale.reading`) at the points that the data allow."""
         return {reading for tried in self.search.allowed() for reading in tried.readings}
 
     @property

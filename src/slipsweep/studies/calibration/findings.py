@@ -12,7 +12,6 @@ import numpy as np
 import xarray as xr
 
 from slipsweep.model import variables
-from slipsweep.motion.shaking import TABLE
 from slipsweep.studies.calibration import sweep_tables
 from slipsweep.studies.calibration.corrected import (
     corrected_channels,
@@ -23,7 +22,8 @@ from slipsweep.studies.calibration.estimate import Estimate, Fit, Solution
 from slipsweep.studies.calibration.measured_friction import onset_acceleration
 from slipsweep.studies.calibration.noise import flat_top, noisy_flat_top
 from slipsweep.studies.calibration.observation import SOUGHT, Observation
-from slipsweep.studies.datasets import sweep
+from slipsweep.studies.calibration.shaking_test import TABLE
+from slipsweep.studies.sweeps import sweep
 
 #: Part of its largest acceleration from which on a table moves.
 _MOVES = 0.1

@@ -20,6 +20,7 @@ from scipy.stats import t as student
 from slipsweep._version import __version__
 from slipsweep.errors import InputError
 from slipsweep.model import equations
+from slipsweep.model.docstrings import with_parameters
 from slipsweep.model.parameters import (
     check_finite,
     check_numbers,
@@ -28,7 +29,13 @@ from slipsweep.model.parameters import (
     single_friction_coefficient,
 )
 from slipsweep.model.variables import HISTORY, MEASURED_FRICTION, PARAMETERS, REFERENCE, SLIDES
-from slipsweep.motion.shaking import CHANNELS, TABLE, ShakingTest, read_test, unit_factor
+from slipsweep.studies.calibration.shaking_test import (
+    CHANNELS,
+    TABLE,
+    ShakingTest,
+    read_test,
+    unit_factor,
+)
 
 Floats = NDArray[np.float64]
 
@@ -265,6 +272,7 @@ def mean_with_interval(values: Floats, noise: float, systematic: float) -> Float
     return float(np.mean(values)) + np.array([-half, 0.0, half])
 
 
+@with_parameters
 def measured_friction(
     test: Test,
     theta: float,
@@ -290,9 +298,6 @@ def measured_friction(
         acceleration (m/s2)``; or a Dataset along `time` (s) with `ground_acceleration` (the
         table's) and `block_acceleration`, in m/s² or in the unit of their attribute `units`.
         Samples need not be evenly spaced.
-    theta, mu_s, phi : float
-        Inclination of the base, degrees, and static friction coefficient, or its angle, degrees:
-        mu_s = tan phi.
     g : float
         Gravity, m/s².
     offset, drift : str or list of str

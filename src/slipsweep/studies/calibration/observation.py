@@ -23,9 +23,9 @@ from slipsweep.model.options import Cycle, Mendez
 from slipsweep.model.variables import HISTORY
 from slipsweep.motion.cutting import path_of_record
 from slipsweep.motion.records import Record
-from slipsweep.motion.shaking import RESPONSES, TABLE, ShakingTest, check_channels
 from slipsweep.studies.calibration.measured_friction import Floats, check_contact, noise_of
 from slipsweep.studies.calibration.noise import LEAST_NOISE, OF_MEDIAN, converter_noise
+from slipsweep.studies.calibration.shaking_test import RESPONSES, TABLE, ShakingTest, check_channels
 from slipsweep.studies.calibration.table_motion import table_motion
 
 #: Function of Üy, λ, Δμ and times that returns the series of `HISTORY`.
