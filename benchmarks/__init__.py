@@ -1,1 +1,1 @@
-"""Measurements: each module is a command, ``python -m benchmarks.NAME``, that writes its tables and figures anew."""
+"""Measurements: each module is a command, ``python -m benchmarks.NAME``, that writes its tables."""

@@ -34,7 +34,7 @@ def rows_of(found: dict[str, list[Comparison]]) -> list[list[object]]:
     for kind, comparisons in found.items():
         differences = [comparison.difference for comparison in comparisons]
         times = [comparison.times_bound for comparison in comparisons]
-        agreed = sum(one <= 1.0 for one in times)
+        agreed = sum(ratio <= 1.0 for ratio in times)
         shown = (number(value, 2) for value in (median(differences), max(differences), max(times)))
         rows.append([kind.replace("_", " "), len(times), agreed, *shown])
     return rows
@@ -42,15 +42,15 @@ def rows_of(found: dict[str, list[Comparison]]) -> list[list[object]]:
 
 def compare_records(seed: int) -> Iterator[Comparison]:
     """The comparisons of some made-up records."""
-    for one in range(seed, seed + RECORDS):
-        found = difference(made(one))
+    for record_seed in range(seed, seed + RECORDS):
+        largest = difference(made(record_seed))
         yield Comparison(
             BY_RECORD,
             "record",
             1,
-            found,
-            found / SEEN,
-            f"tests.support.made_up_records.made({one})",
+            largest,
+            largest / SEEN,
+            f"tests.support.made_up_records.made({record_seed})",
         )
 
 
@@ -66,10 +66,10 @@ HEADER = [
 
 def main() -> None:
     """Draw, compare, write agreement.md."""
-    given = arguments(__doc__, counts={"cells": CELLS, "seed": -1})
+    options = arguments(__doc__, counts={"cells": CELLS, "seed": -1})
     # a test draws the same cells each time
-    seed = given.seed if given.seed >= 0 else 0 if given.tiny else random.randrange(2**31)
-    cells = 2 * SIZE if given.tiny else given.cells
+    seed = options.seed if options.seed >= 0 else 0 if options.tiny else random.randrange(2**31)
+    cells = 2 * SIZE if options.tiny else options.cells
     print(f"seed {seed}", flush=True)
     kinds: dict[str, list[Comparison]] = {kind: [] for kind in (*FLOORS, BY_RECORD)}
     regimes: dict[str, list[Comparison]] = defaultdict(list)
@@ -95,23 +95,26 @@ def main() -> None:
                 print(f"{comparison.kind}: {comparison.text}", flush=True)
         if first % (50 * SIZE) == 0:
             print(f"{first} cells, {len(wrong)} disagreements", flush=True)
-    by_kind = table(HEADER, rows_of({kind: found for kind, found in kinds.items() if found}))
+    by_kind = table(
+        HEADER, rows_of({kind: comparisons for kind, comparisons in kinds.items() if comparisons})
+    )
     by_regime = table(
         [HEADER[0].replace("the cycle", "the step"), *HEADER[1:]],
         rows_of(dict(sorted(regimes.items()))),
     )
     print(by_kind, by_regime, sep="\n")
     head = (
-        f"{cells:,} cells, {modes[0]:,} of them stuck, {modes[1]:,} in stick–slip, {modes[2]:,} in continuous sliding, "
-        f"{modes[-1]:,} without a value. {measured_on(('numpy', 'numba'))} Written by `python -m benchmarks.agreement"
-        f" --cells {cells} --seed {seed}`."
+        f"{cells:,} cells, {modes[0]:,} of them stuck, {modes[1]:,} in stick–slip, "
+        f"{modes[2]:,} in continuous sliding, {modes[-1]:,} without a value. "
+        f"{measured_on(('numpy', 'numba'))} "
+        f"Written by `python -m benchmarks.agreement --cells {cells} --seed {seed}`."
     )
     batches = (
-        f"{PLAIN * len(in_batches):,} cells under a sine, solved in batches and from event to event, differ by "
-        f"{number(max(in_batches), 2)} of their bound at most."
+        f"{PLAIN * len(in_batches):,} cells under a sine, solved in batches and from event to "
+        f"event, differ by {number(max(in_batches), 2)} of their bound at most."
     )
     page = f"{head}\n\n{by_kind}\n{by_regime}\n{batches}\n"
-    (given.folder / "agreement.md").write_text(page, encoding="utf-8")
+    (options.folder / "agreement.md").write_text(page, encoding="utf-8")
     if wrong:
         raise SystemExit(f"{len(wrong)} disagreements")
 

@@ -17,7 +17,7 @@ import xarray as xr
 import slipsweep
 from benchmarks.machine import arguments, cores, measured_on, table
 from slipsweep.model.variables import Validity
-from slipsweep.motion.shaking import CHANNELS
+from slipsweep.studies.calibration.shaking_test import CHANNELS
 from tests.support.shaking import SOUGHT, measured
 
 KINDS = {"eq4": "Eq. 4 acts", "yield": "yield governs", "continuous": "continuous"}
@@ -53,10 +53,12 @@ def drawn(kind: str, seed: int) -> tuple[dict[str, float], xr.Dataset]:
         result = slipsweep.sweep(**case, excitation=shaking)
         flags = Validity(int(result.validity))
         mode = int(result.sliding_mode)
-        found = "continuous" if mode == 2 else "yield" if flags & Validity.YIELD_GOVERNS else "eq4"
+        governed_by = (
+            "continuous" if mode == 2 else "yield" if flags & Validity.YIELD_GOVERNS else "eq4"
+        )
         if (
             mode < 1
-            or found != kind
+            or governed_by != kind
             or flags & _NO_TEST
             or abs(float(result.permanent_displacement)) < 1e-4
         ):
@@ -81,14 +83,14 @@ def sensed(test: xr.Dataset, noise: str, seed: int) -> xr.Dataset:
     )
 
 
-def one(task: tuple[str, str, int]) -> list[tuple[bool, bool]]:
-    """Of each parameter, whether the interval holds the true value, and whether it is bounded."""
+def outcome_of(task: tuple[str, str, int]) -> list[tuple[bool, bool]]:
+    """For each parameter, two bools: the interval holds the true value; it is bounded."""
     kind, noise, seed = task
     case, test = drawn(kind, seed)
-    found = slipsweep.calibrate(
+    calibration = slipsweep.calibrate(
         sensed(test, noise, seed), case["theta"], case["mu_s"], cycles=False
     )
-    ends = [found[f"{name}_interval"].values for name in SOUGHT]
+    ends = [calibration[f"{name}_interval"].values for name in SOUGHT]
     return [
         (bool(low <= case[name] <= high), bool(np.isfinite(high) and low > 0.0))
         for name, (low, high) in zip(SOUGHT, ends, strict=True)
@@ -98,45 +100,46 @@ def one(task: tuple[str, str, int]) -> list[tuple[bool, bool]]:
 def report(results: dict[tuple[str, str], np.ndarray]) -> str:
     """The page, from (test, parameter, held or bounded) of each kind and noise."""
     rows: list[list[Any]] = []
-    for (kind, noise), found in results.items():
-        held, bounded = found.mean(axis=0).T
+    for (kind, noise), shares_of_test in results.items():
+        held, bounded = shares_of_test.mean(axis=0).T
         shares = [
-            f"{100 * share:.1f} % ({100 * known:.0f} %)"
-            for share, known in zip(held, bounded, strict=True)
+            f"{100 * held_share:.1f} % ({100 * bounded_share:.0f} %)"
+            for held_share, bounded_share in zip(held, bounded, strict=True)
         ]
-        rows.append([KINDS[kind], noise, len(found), *shares])
+        rows.append([KINDS[kind], noise, len(shares_of_test), *shares])
     return (
         f"{measured_on(('numpy', 'scipy', 'numba'), timed=False)}\n\n"
-        "Share of tests whose 95 % interval holds the true value; in brackets the share whose interval has both "
-        "ends. *White*: noise of 1 % of each channel's peak, the table's among them. *12 bits*: a converter of 12 "
-        f"bits and no other noise. {CYCLES} cycles, {RATE} samples a second, all four channels; θ 0 to 14°, μs 0.2 "
-        "to 0.6, λ 0.5 to 6, Δμ up to 0.4 μs, A 1.5 to 9 m/s², A/Üy 1.2 to 5, 1 to 4 Hz. By `python -m "
-        f"benchmarks.calibration --repetitions {rows[0][2]}`.\n\n"
+        "Share of tests whose 95 % interval holds the true value; in brackets the share whose "
+        "interval has both ends. *White*: noise of 1 % of each channel's peak, the table's among "
+        "them. *12 bits*: a converter of 12 bits and no other noise. "
+        f"{CYCLES} cycles, {RATE} samples a second, all four channels; θ 0 to 14°, μs 0.2 to 0.6, "
+        "λ 0.5 to 6, Δμ up to 0.4 μs, A 1.5 to 9 m/s², A/Üy 1.2 to 5, 1 to 4 Hz. "
+        f"By `python -m benchmarks.calibration --repetitions {rows[0][2]}`.\n\n"
         + table(["tests", "noise", "number", "Üy", "λ", "Δμ"], rows)
     )
 
 
 def main() -> None:
     """Measure, write calibration.md."""
-    given = arguments(__doc__, counts={"repetitions": 500})
-    repetitions = 1 if given.tiny else given.repetitions
-    kinds = [(kind, noise) for kind in KINDS for noise in NOISES][-1 if given.tiny else 0 :]
+    options = arguments(__doc__, counts={"repetitions": 500})
+    repetitions = 1 if options.tiny else options.repetitions
+    kinds = [(kind, noise) for kind in KINDS for noise in NOISES][-1 if options.tiny else 0 :]
     tasks = [(kind, noise, seed) for seed in range(repetitions) for kind, noise in kinds]
-    if given.tiny:
-        found = [one(task) for task in tasks]
+    if options.tiny:
+        calibrated = [outcome_of(task) for task in tasks]
     else:
         os.environ["OPENBLAS_NUM_THREADS"] = "1"
-        one(tasks[0])  # compiled once, for all processes
+        outcome_of(tasks[0])  # compiled once, for all processes
         # a fork would take the threads' locks of this process along
         with ProcessPoolExecutor(cores(), multiprocessing.get_context("spawn")) as pool:
-            found = list(pool.map(one, tasks, chunksize=4))
+            calibrated = list(pool.map(outcome_of, tasks, chunksize=4))
     results = {
         kind: np.array(
-            [result for task, result in zip(tasks, found, strict=True) if task[:2] == kind]
+            [result for task, result in zip(tasks, calibrated, strict=True) if task[:2] == kind]
         )
         for kind in kinds
     }
-    (given.folder / "calibration.md").write_text(report(results), encoding="utf-8")
+    (options.folder / "calibration.md").write_text(report(results), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -38,10 +38,10 @@ class Approximation:
             powers = mpmath.matrix(
                 [[place**power for power in range(self.nodes)] for place in places]
             )
-            found = mpmath.lu_solve(
+            solution = mpmath.lu_solve(
                 powers, mpmath.matrix([self.function(place) for place in places])
             )
-            return [float(one) for one in found]
+            return [float(coefficient) for coefficient in solution]
 
     def error(self, coefficients: list[float]) -> float:
         """Largest error relative to the function."""

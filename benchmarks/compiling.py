@@ -92,9 +92,9 @@ def first_use(names: list[str]) -> tuple[float, float, int, int]:
 
 def main() -> None:
     """Measure every first use, write and print compiling.md."""
-    given = arguments(__doc__)
+    options = arguments(__doc__)
     rows = []
-    for name, uses in list(USES.items())[: 1 if given.tiny else None]:
+    for name, uses in list(USES.items())[: 1 if options.tiny else None]:
         imported, used, functions, compilations = first_use(uses)
         rows.append([name, number(used), number(used / imported, 2), functions, compilations])
     header = [
@@ -105,7 +105,7 @@ def main() -> None:
         "compilations",
     ]
     text = f"# Compiling\n\n{measured_on()}\n\n{table(header, rows)}"
-    (given.folder / "compiling.md").write_text(text)
+    (options.folder / "compiling.md").write_text(text)
     print(text)
 
 

@@ -1,4 +1,4 @@
-"""Programs that solve differential equations, and pySLAMMER, on cells of `benchmarks.sample`: for speed_vs_error.
+"""Programs that solve differential equations, and pySLAMMER, on cells of `benchmarks.sample`.
 
 One cycle of a sine: Newmark's block, and the paper's law in stick–slip.  General solvers are given
 the rate of the relative velocity, the phases at which it has a kink, and the event that the block
@@ -25,8 +25,7 @@ END = 40.0 * np.pi
 
 
 def rate_by(xp: Any) -> Callable[[Any, Any], Any]:
-    """dV/dφ of a block that slides, in units of A, as a function of the phase and a cell, by NumPy or jax.numpy.
-
+    """dV/dφ of a sliding block, in units of A, of the phase and a cell, by NumPy or jax.numpy.
     b = max(Üy, Eq. 4) up to the peak of Üg, held beyond it; Eq. 12 from Üg = 0 on.  Newmark's block
     has b = Üy.
     """
@@ -48,10 +47,10 @@ def cells_of(group: Group) -> Any:
     theta, mu_s, amplitude = (
         xr.DataArray(group.inputs[name], dims="cell") for name in ("theta", "mu_s", "amplitude")
     )
-    found = slipsweep.friction_parameters(theta, mu_s, amplitude)
-    onset = found.yield_acceleration
-    most = mu_s + found.delta_mu
-    decay = found.decay_rate
+    friction = slipsweep.friction_parameters(theta, mu_s, amplitude)
+    onset = friction.yield_acceleration
+    most = mu_s + friction.delta_mu
+    decay = friction.decay_rate
     law = xr.full_like(mu_s, group.model == "mendez", float)
     return np.nan_to_num(
         np.stack([amplitude, onset, mu_s, np.tan(np.radians(theta)), most, decay, law], axis=1)
@@ -59,7 +58,7 @@ def cells_of(group: Group) -> Any:
 
 
 def begin_at_yield(group: Group) -> Group:
-    """The cells whose slide begins at Üy: under a few others, Eq. 4 lets the block stick for longer."""
+    """Cells whose slide begins at Üy: in a few others, Eq. 4 lets the block stick for longer."""
     cells = cells_of(group)
     rates = [rate_by(np)(np.arcsin(cell[1] / cell[0]) + 1e-6, cell) for cell in cells]
     return group.take(np.flatnonzero(np.array(rates) > 0.0))
@@ -93,7 +92,7 @@ def _diffrax(tolerance: float) -> Any:
     stop = diffrax.Event(moving, bisection(1e-14, 1e-14))
 
     def solve(cell: Any) -> Any:
-        found = diffrax.diffeqsolve(
+        solution = diffrax.diffeqsolve(
             term,
             diffrax.Dopri8(),
             jnp.arcsin(cell[1] / cell[0]),
@@ -106,7 +105,7 @@ def _diffrax(tolerance: float) -> Any:
             max_steps=100_000,
             throw=False,
         )
-        return found.ys[0, 1]
+        return solution.ys[0, 1]
 
     return jax.jit(jax.vmap(solve))
 
@@ -127,7 +126,7 @@ def by_cyrk(group: Group, tolerance: float) -> Any:
 
 def _one_by_one(group: Group, solve_ivp: Any, tolerance: float) -> Any:
     derivatives, stop = _compiled()
-    found = []
+    displacements = []
     for cell in cells_of(group):
         y = np.zeros(2)
         ends = [float(np.arcsin(cell[1] / cell[0])), PEAK, ZERO, END]
@@ -146,8 +145,8 @@ def _one_by_one(group: Group, solve_ivp: Any, tolerance: float) -> Any:
             y = np.array(run.y[:, -1])
             if events and len(run.t_events[0]):
                 break
-        found.append(y[1])
-    return _unscaled(group, np.array(found))
+        displacements.append(y[1])
+    return _unscaled(group, np.array(displacements))
 
 
 @cache
@@ -182,9 +181,9 @@ def by_pyslammer(group: Group, steps: int) -> Any:
     return np.array([run.max_sliding_disp for run in runs]) / group.inputs["frequency"] ** 2
 
 
-def _unscaled(group: Group, found: Any) -> Any:
+def _unscaled(group: Group, scaled: Any) -> Any:
     return (
-        np.asarray(found)
+        np.asarray(scaled)
         * group.inputs["amplitude"]
         / (2.0 * np.pi * group.inputs["frequency"]) ** 2
     )
@@ -192,7 +191,7 @@ def _unscaled(group: Group, found: Any) -> Any:
 
 @dataclass(frozen=True)
 class Program:
-    """A function of a group and a setting, its settings and regimes, the cells it is given, its marker and colour."""
+    """Function of a group and a setting, its settings, regimes and cells, its marker and colour."""
 
     solve: Callable[[Group, Any], Any]
     marker: str

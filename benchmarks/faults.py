@@ -15,11 +15,11 @@ ROUNDS = 50
 
 def main() -> None:
     """Do the rounds, and write the table."""
-    given = machine.arguments(__doc__)
+    options = machine.arguments(__doc__)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         whole = prepared(folder)
-        for number in range(1 if given.tiny else ROUNDS):
+        for number in range(1 if options.tiny else ROUNDS):
             for fault, tried in FAULTS.items():
                 tried(folder, OUTPUTS[number % 2], whole, random.Random(number))
                 print(number + 1, fault, flush=True)
@@ -31,7 +31,7 @@ def main() -> None:
             rows = [[fault, " ".join(text.split()), done, done] for fault, text in texts.items()]
             text = f"{machine.measured_on(('netCDF4', 'zarr', 'distributed'))}\n\n"
             text += machine.table(["fault", "what it is", "tried", "survived"], rows)
-            (given.folder / "faults.md").write_text(text)
+            (options.folder / "faults.md").write_text(text)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
-"""Large sweeps to disk: ``python -m benchmarks.large_sweeps`` writes results/large_sweeps.md; minutes, 8 GB.
+"""Large sweeps to disk: ``python -m benchmarks.large_sweeps`` writes large_sweeps.md.
 
+It takes minutes and 8 GB.
 `slipsweep run` of 10⁸ cells, beside what netCDF4 and xarray need to write the same arrays, and the
 memory that a run takes at its peak.  ``--larger 10`` adds 10⁹ cells in netCDF, once: 20 GB of disk.
 """
@@ -49,7 +50,7 @@ def sweep_file(path: Path, lengths: Sequence[int]) -> Path:
 
 
 def seconds_and_memory(*command: str) -> tuple[float, float]:
-    """Seconds of a process, with what it has written on the disk itself, and its resident memory at the peak, MB."""
+    """Seconds of a process until its output is on the disk, and its peak resident memory, MB."""
     started = time.perf_counter()
     process = subprocess.Popen([sys.executable, *command])
     _, status, usage = os.wait4(process.pid, 0)
@@ -89,7 +90,7 @@ def write_xarray(path: Path, lengths: Sequence[int]) -> float:
 def measured(
     folder: Path, lengths: Sequence[int], turns: int, outputs: dict[str, tuple[str, ...]]
 ) -> str:
-    """The table of a sweep of these lengths, written by `slipsweep run` to each of `outputs`, and by the others."""
+    """Table of a sweep of these lengths, written by `slipsweep run`, netCDF4 and xarray."""
     seconds: dict[str, list[float]] = {}
     memory: dict[str, float] = {}
     sweep = sweep_file(folder / "a.toml", lengths)
@@ -139,8 +140,8 @@ def measured(
 
 def main() -> None:
     """Measure, and write the table."""
-    given = machine.arguments(__doc__, counts={"larger": 0})
-    lengths = (10, 5, 10, 20) if given.tiny else (100, 50, 100, 200)
+    options = machine.arguments(__doc__, counts={"larger": 0})
+    lengths = (10, 5, 10, 20) if options.tiny else (100, 50, 100, 200)
     with tempfile.TemporaryDirectory(dir=Path.cwd()) as name:
         outputs: dict[str, tuple[str, ...]] = {
             "a.nc": (),
@@ -148,13 +149,13 @@ def main() -> None:
             "a.zarr": (),
         }
         tables = []
-        if given.larger:  # first: the peak of a process begins with that of this one
+        if options.larger:  # first: the peak of a process begins with that of this one
             tables.append(
-                measured(Path(name), (lengths[0] * given.larger, *lengths[1:]), 1, {"a.nc": ()})
+                measured(Path(name), (lengths[0] * options.larger, *lengths[1:]), 1, {"a.nc": ()})
             )
-        tables.insert(0, measured(Path(name), lengths, 1 if given.tiny else TURNS, outputs))
+        tables.insert(0, measured(Path(name), lengths, 1 if options.tiny else TURNS, outputs))
     text = "\n\n".join([machine.measured_on(("numpy", "numba", "netCDF4", "zarr")), *tables])
-    (given.folder / "large_sweeps.md").write_text(text + "\n")
+    (options.folder / "large_sweeps.md").write_text(text + "\n")
     print(text)
 
 

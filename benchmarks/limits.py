@@ -43,9 +43,9 @@ class Group:
 
     def text(self, block: int) -> str:
         """One of the blocks."""
-        given = {**self.blocks, "displacement": self.displacement}
+        inputs = {**self.blocks, "displacement": self.displacement}
         return (
-            ", ".join(f"{name}={float(values[block])!r}" for name, values in given.items())
+            ", ".join(f"{name}={float(values[block])!r}" for name, values in inputs.items())
             + f", {self.options}"
         )
 
@@ -112,8 +112,7 @@ KINDS = {
 
 
 def ratios(group: Group, amplitudes: int) -> Iterator[float]:
-    """Each limit over that of the dense scan; NaN where neither has one, infinite or 0 where one has none.
-
+    """Each limit over that of the dense scan; NaN if neither has one, ∞ or 0 if one has none.
     Raises
     ------
     RuntimeError
@@ -122,31 +121,31 @@ def ratios(group: Group, amplitudes: int) -> Iterator[float]:
     shaking = (
         {} if isinstance(group.options.get("excitation"), slipsweep.Record) else {"frequency": 1.0}
     )
-    given = {**group.blocks, **shaking, **choices(**group.options)}
-    found = slipsweep.limit_amplitude(
-        group.displacement, **given, maximum_amplitude=HIGHEST
+    inputs = {**group.blocks, **shaking, **choices(**group.options)}
+    limits = slipsweep.limit_amplitude(
+        group.displacement, **inputs, maximum_amplitude=HIGHEST
     ).limit_amplitude.values
 
     def reaches(amplitude: np.ndarray) -> np.ndarray:
         axis = xr.DataArray(amplitude, dims=("block", "step")[: amplitude.ndim])
         moved = slipsweep.sweep(
-            **given, amplitude=axis, variables=["permanent_displacement"]
+            **inputs, amplitude=axis, variables=["permanent_displacement"]
         ).permanent_displacement
         return np.asarray((moved >= group.displacement).transpose(*axis.dims).values)
 
-    has = np.isfinite(found)
-    at = np.where(has, found, HIGHEST)
-    below = np.where(has, np.nextafter(found, 0.0), HIGHEST)
+    has = np.isfinite(limits)
+    at = np.where(has, limits, HIGHEST)
+    below = np.where(has, np.nextafter(limits, 0.0), HIGHEST)
     if not (reaches(at)[has].all() and not reaches(below)[has].any()):
         raise RuntimeError("a sweep does not give the displacement from the limit on")
-    known: dict[str, Any] = {**group.blocks, "variables": ["yield_acceleration"]}
-    start = slipsweep.sweep(**known, amplitude=HIGHEST, frequency=1.0).yield_acceleration.values
+    options: dict[str, Any] = {**group.blocks, "variables": ["yield_acceleration"]}
+    start = slipsweep.sweep(**options, amplitude=HIGHEST, frequency=1.0).yield_acceleration.values
     start = np.where(start > 0.0, np.minimum(start, HIGHEST), HIGHEST)
     dense = start[:, None] * (HIGHEST / start[:, None]) ** np.linspace(0.0, 1.0, amplitudes)
     dense[:, -1] = HIGHEST
     reached = reaches(dense)
     first = reached.argmax(axis=1)
-    for block in range(found.size):
+    for block in range(limits.size):
         if not reached[block].any():
             yield 0.0 if has[block] else np.nan
         elif not has[block]:
@@ -157,8 +156,8 @@ def ratios(group: Group, amplitudes: int) -> Iterator[float]:
             # the dense scan tells the limit to one of its steps only
             yield (
                 1.0
-                if low * (1.0 - _SAME) <= found[block] <= high * (1.0 + _SAME)
-                else float(found[block] / high)
+                if low * (1.0 - _SAME) <= limits[block] <= high * (1.0 + _SAME)
+                else float(limits[block] / high)
             )
 
 
@@ -174,9 +173,9 @@ HEADER = [
 
 def main() -> None:
     """Draw, compare, write limits.md."""
-    given = arguments(__doc__, counts={"blocks": BLOCKS, "seed": -1})
-    seed = given.seed if given.seed >= 0 else random.randrange(2**31)
-    blocks, amplitudes = (4, 64) if given.tiny else (given.blocks, AMPLITUDES)
+    options = arguments(__doc__, counts={"blocks": BLOCKS, "seed": -1})
+    seed = options.seed if options.seed >= 0 else random.randrange(2**31)
+    blocks, amplitudes = (4, 64) if options.tiny else (options.blocks, AMPLITUDES)
     rows: list[list[object]] = []
     for place, (kind, drawn) in enumerate(KINDS.items()):
         rng = np.random.default_rng([seed, place])
@@ -200,10 +199,11 @@ def main() -> None:
             ]
         )
         print(*rows[-1], sep=", ", flush=True)
-    (given.folder / "limits.md").write_text(
-        f"{table(HEADER, rows)}\n{blocks:,} blocks of each kind, most with a limit, against {amplitudes:,} amplitudes; "
-        f"the worst ratio is that of a higher limit. {measured_on(('numpy', 'numba'))} Written by "
-        f"`python -m benchmarks.limits --blocks {blocks} --seed {seed}`.\n",
+    (options.folder / "limits.md").write_text(
+        f"{table(HEADER, rows)}\n"
+        f"{blocks:,} blocks of each kind, most with a limit, against {amplitudes:,} amplitudes; "
+        f"the worst ratio is that of a higher limit. {measured_on(('numpy', 'numba'))} "
+        f"Written by `python -m benchmarks.limits --blocks {blocks} --seed {seed}`.\n",
         encoding="utf-8",
     )
 

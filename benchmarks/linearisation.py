@@ -19,14 +19,14 @@ from scipy.optimize import brentq
 
 import slipsweep
 from benchmarks.machine import arguments, cores, table
-from slipsweep.motion.shaking import CHANNELS
+from slipsweep.studies.calibration.shaking_test import CHANNELS
 
-#: Friction coefficient that the blocks have at rest where it falls, and at speed where it rises: that
-#: of the paper's interface.
+#: Friction coefficient that the blocks have at rest where it falls, and at speed where it rises:
+#: that of the paper's interface.
 MU = 0.38
 
-#: Published sizes of friction that depends on velocity, of sliding bearings: how much it changes (0.093
-#: and 0.113; half of it), and a in s/m.  They rise; those that fall have the same size.
+#: Published sizes of friction that depends on velocity, of sliding bearings: its change (0.093 and
+#: 0.113; half of it), and a in s/m.  They rise; those that fall have the same size.
 RATE_LAWS = {
     "Constantinou and others 1990": (0.0927, 23.6),
     "OpenSees, VelDependent": (0.113, 24.2),
@@ -76,8 +76,8 @@ class Block:
         """Return its permanent displacements, m."""
         block: dict[str, Any] = {"theta": self.theta, **self.friction, "model": self.model}
         wave = slipsweep.Sine(cycles=CYCLES)
-        found = slipsweep.sweep(**block, amplitude=amplitude, frequency=frequency, excitation=wave)
-        moved: xr.DataArray = found.permanent_displacement.reset_coords(drop=True)
+        result = slipsweep.sweep(**block, amplitude=amplitude, frequency=frequency, excitation=wave)
+        moved: xr.DataArray = result.permanent_displacement.reset_coords(drop=True)
         return moved
 
 
@@ -128,20 +128,20 @@ def fitted_friction(block: Block) -> float:
     shaking: dict[str, Any] = {"amplitude": block.amplitude, "frequency": block.frequency}
 
     def excess(mu_s: float) -> float:
-        found = slipsweep.sweep(block.theta, mu_s, **shaking, model="newmark", excitation=wave)
-        return float(found.permanent_displacement) - target
+        result = slipsweep.sweep(block.theta, mu_s, **shaking, model="newmark", excitation=wave)
+        return float(result.permanent_displacement) - target
 
     least = math.tan(math.radians(block.theta)) + 1e-4
     return float(brentq(excess, least, 2.0, xtol=1e-9))
 
 
 def predicted(job: tuple[int, Block]) -> list[dict[str, Any]]:
-    """Return predictions and the true displacement at all shakings of a block but that of its test."""
+    """Return predictions and the true displacement at all shakings but that of the test."""
     seed, block = job
     test, kinetic = test_of(block, seed)
-    found = slipsweep.calibrate(test, block.theta, block.friction["mu_s"], cycles=False)
+    calibration = slipsweep.calibrate(test, block.theta, block.friction["mu_s"], cycles=False)
     names = ("yield_acceleration", "decay_rate", "delta_mu")
-    law: dict[str, Any] = {name: float(found[name]) for name in names}
+    law: dict[str, Any] = {name: float(calibration[name]) for name in names}
     amplitude = xr.DataArray(block.amplitude * np.array(AMPLITUDES), dims="a")
     frequency = xr.DataArray(block.frequency * np.array(FREQUENCIES), dims="f")
     wave = slipsweep.Sine(cycles=CYCLES)
@@ -158,7 +158,7 @@ def predicted(job: tuple[int, Block]) -> list[dict[str, Any]]:
         slipsweep.sweep(**shaking, mu_s=mu_s, **law),
         *(slipsweep.sweep(**shaking, mu_s=friction, model="newmark") for friction in constant),
     ]
-    moved = [one.permanent_displacement.transpose("a", "f").values for one in answers]
+    moved = [answer.permanent_displacement.transpose("a", "f").values for answer in answers]
     rows = []
     for a, times_a in enumerate(AMPLITUDES):
         for f, times_f in enumerate(FREQUENCIES):
@@ -218,9 +218,9 @@ def draw(kinds: dict[str, list[dict[str, Any]]]) -> Figure:
 
 def main() -> None:
     """Write the table and the chart."""
-    given = arguments(__doc__)
+    options = arguments(__doc__)
     jobs = list(enumerate(blocks()))
-    if given.tiny:
+    if options.tiny:
         jobs = jobs[1:2]
         parts = [predicted(job) for job in jobs]
     else:
@@ -231,18 +231,20 @@ def main() -> None:
     for row in rows:
         kinds.setdefault(row["kind"], []).append(row)
     lines = [
-        line_of(kind, own, which) for kind, own in kinds.items() for which in range(len(PREDICTORS))
+        line_of(kind, rows_of_kind, which)
+        for kind, rows_of_kind in kinds.items()
+        for which in range(len(PREDICTORS))
     ]
     slides = [row for row in rows if row["truth"] >= LEAST]
     heading = ["friction", "predicted by", "shakings", "median", "5 to 95 %", "within a factor 2"]
-    about = (
-        f"Predicted over true permanent displacement of {len(jobs)} blocks, {len(slides)} shakings of "
-        f"{CYCLES} cycles of a sine in which the block moves by 1 mm or more; one of no value counts as 0. "
-        "Written by `python -m benchmarks.linearisation`."
+    legend = (
+        f"Predicted over true permanent displacement of {len(jobs)} blocks, {len(slides)} shakings "
+        f"of {CYCLES} cycles of a sine in which the block moves by 1 mm or more; one of no value "
+        "counts as 0. Written by `python -m benchmarks.linearisation`."
     )
-    text = f"{table(heading, lines)}\n{about}\n"
-    (given.folder / "linearisation.md").write_text(text, encoding="utf-8")
-    draw(kinds).savefig(given.folder / "linearisation.png", dpi=120)
+    text = f"{table(heading, lines)}\n{legend}\n"
+    (options.folder / "linearisation.md").write_text(text, encoding="utf-8")
+    draw(kinds).savefig(options.folder / "linearisation.png", dpi=120)
 
 
 if __name__ == "__main__":

@@ -37,23 +37,26 @@ def cores() -> int:
 
 def versions(packages: Iterable[str]) -> str:
     """Versions of those of `packages` that are installed, and Python's."""
-    found = [f"Python {platform.python_version()}"]
+    texts = [f"Python {platform.python_version()}"]
     for package in packages:
         try:
-            found.append(f"{package} {version(package)}")
+            texts.append(f"{package} {version(package)}")
         except PackageNotFoundError:
             continue
-    return ", ".join(found)
+    return ", ".join(texts)
 
 
 def measured_on(packages: Iterable[str] = ("numpy", "numba", "xarray"), timed: bool = True) -> str:
-    """The sentence that stands over every table; over times it says so if other processes had the cores, too."""
+    """Machine and versions, over every table; with times also the load of other processes."""
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     is_busy = timed and load > 2 * cores()
     busy = (
         f" Other processes used the machine (load {load:.0f}): times are rough." if is_busy else ""
     )
-    return f"Measured on {processor()}; {platform.system()}, {versions(packages)}, slipsweep {__version__}.{busy}"
+    return (
+        f"Measured on {processor()}; {platform.system()}, {versions(packages)}, "
+        f"slipsweep {__version__}.{busy}"
+    )
 
 
 def alternate(
@@ -103,7 +106,7 @@ def arguments(
     counts: Mapping[str, int] | None = None,
     files: Iterable[str] = (),
 ) -> argparse.Namespace:
-    """The command line that all measurements share, and whole numbers with their defaults and files of its own."""
+    """Command line that all measurements share, with further whole numbers and files."""
     parser = argparse.ArgumentParser(description=(description or "").split("\n")[0])
     parser.add_argument("--tiny", action="store_true", help="a few cells only, to see that it runs")
     parser.add_argument(
@@ -116,6 +119,6 @@ def arguments(
         parser.add_argument(f"--{name}", type=int, default=default, help="(default: %(default)s)")
     for name in files:
         parser.add_argument(f"--{name}", type=Path)
-    given = parser.parse_args()
-    given.folder.mkdir(parents=True, exist_ok=True)
-    return given
+    options = parser.parse_args()
+    options.folder.mkdir(parents=True, exist_ok=True)
+    return options

@@ -64,41 +64,44 @@ _ROUNDING = 1e-9
 def experiments() -> str:
     """Permanent displacement of both experiments under every choice of inputs, in millimetres."""
     rows: list[list[object]] = [["the published figures end at", "150", "200"]]
-    for text, (given, model) in INPUTS.items():
+    for text, (values_of, model) in INPUTS.items():
         row: list[object] = [text]
         for which, cell in enumerate((STICK_SLIP, CONTINUOUS)):
-            inputs = cell | {name: values[which] for name, values in given.items()}
-            found = slipsweep.sweep(**inputs, excitation=slipsweep.Sine(cycles=CYCLES), model=model)  # type: ignore[arg-type]
+            inputs = cell | {name: values[which] for name, values in values_of.items()}
+            shaking = slipsweep.Sine(cycles=CYCLES)
+            options: Any = inputs | {"excitation": shaking, "model": model}
+            result = slipsweep.sweep(**options)
             about = []
             if (
                 model != "newmark"
-                and found.sliding_mode != (SlidingMode.STICK_SLIP, SlidingMode.CONTINUOUS)[which]
+                and result.sliding_mode != (SlidingMode.STICK_SLIP, SlidingMode.CONTINUOUS)[which]
             ):
                 about.append(
-                    f"as {SlidingMode(found.sliding_mode.item()).name.lower().replace('_', '–')}"
+                    f"as {SlidingMode(result.sliding_mode.item()).name.lower().replace('_', '–')}"
                 )
-            if found.validity & Validity.NOT_RECOUPLED:
+            if result.validity & Validity.NOT_RECOUPLED:
                 about.append("still slides at the next pulse")
-            value = f"{found.permanent_displacement.item() * 1000:.0f}"
+            value = f"{result.permanent_displacement.item() * 1000:.0f}"
             row.append(f"{value} ({', '.join(about)})" if about else value)
         rows.append(row)
     return table(["inputs", "stick–slip, mm", "continuous, mm"], rows)
 
 
 def sensitivity() -> str:
-    """Change of the permanent displacement of both experiments when one input is a tenth larger or smaller."""
+    """Change of both experiments' permanent displacement as an input grows or falls by a tenth."""
     shaking = slipsweep.Sine(cycles=CYCLES)
     rows: list[list[object]] = []
     names = {"yield_acceleration": "Üy", "decay_rate": "λ", "delta_mu": "Δμ"}
     names |= {"mu_s": "μs", "theta": "θ", "amplitude": "A", "frequency": "f"}
-    given = {**_DECAY, "delta_mu": PRINTED_DELTA_MU}
+    printed = {**_DECAY, "delta_mu": PRINTED_DELTA_MU}
     cells = [
-        cell | {name: values[which] for name, values in given.items()}
+        cell | {name: values[which] for name, values in printed.items()}
         for which, cell in enumerate((STICK_SLIP, CONTINUOUS))
     ]
 
     def displacement(cell: dict[str, float]) -> float:
-        return float(slipsweep.sweep(**cell, excitation=shaking).permanent_displacement)  # type: ignore[arg-type]
+        result = slipsweep.sweep(**cell, excitation=shaking)  # type: ignore[arg-type]
+        return float(result.permanent_displacement)
 
     for name, symbol in names.items():
         row: list[object] = [symbol]
@@ -113,11 +116,11 @@ def sensitivity() -> str:
 
 
 def against(
-    found: xr.Dataset, axis: str
+    result: xr.Dataset, axis: str
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
-    """Steps of the grid along an axis: with a displacement at both ends, against what is expected, with a caution."""
-    low = found.isel({axis: slice(None, -1)})
-    high = found.isel({axis: slice(1, None)})
+    """Steps along an axis: those between displacements, against the trend, and under a caution."""
+    low = result.isel({axis: slice(None, -1)})
+    high = result.isel({axis: slice(1, None)})
     before = low.permanent_displacement.values
     after = high.permanent_displacement.values
     there = np.isfinite(before) & np.isfinite(after) & ((before != 0) | (after != 0))
@@ -132,15 +135,15 @@ def trends(tiny: bool) -> str:
     grid: dict[str, Any] = {name: values[:: 8 if tiny else 1] for name, values in SLOPE.items()}
     rows: list[list[object]] = []
     for text, options in MODELS.items():
-        found = slipsweep.sweep(
+        result = slipsweep.sweep(
             **grid, frequency=1.0, excitation=slipsweep.Sine(cycles=15), **options
         )
         for mode in (SlidingMode.STICK_SLIP, SlidingMode.CONTINUOUS):
             row: list[object] = [text, mode.name.lower().replace("_", "–")]
             warned = total = 0
             for axis in EXPECTED:
-                there, wrong, caution = against(found, axis)
-                codes = found.sliding_mode
+                there, wrong, caution = against(result, axis)
+                codes = result.sliding_mode
                 both = [
                     codes.isel({axis: part}).values == mode
                     for part in (slice(None, -1), slice(1, None))
@@ -164,21 +167,22 @@ def trends(tiny: bool) -> str:
 
 def main() -> None:
     """Solve, and write the tables."""
-    given = arguments(__doc__)
+    options = arguments(__doc__)
     by = "Written by `python -m benchmarks.model_trends`.\n"
-    (given.folder / "experiments.md").write_text(
-        f"{experiments()}\nA sine of the printed amplitude, {CYCLES} cycles. Üy is the yield acceleration, at which "
-        f"sliding begins; λ and Δμ describe how friction decays with stronger shaking. {by}",
+    (options.folder / "experiments.md").write_text(
+        f"{experiments()}\nA sine of the printed amplitude, {CYCLES} cycles. "
+        "Üy is the yield acceleration, at which sliding begins; λ and Δμ describe how friction "
+        f"decays with stronger shaking. {by}",
         encoding="utf-8",
     )
-    (given.folder / "sensitivity.md").write_text(
+    (options.folder / "sensitivity.md").write_text(
         f"{sensitivity()}\nWith Üy measured, λ and Δμ as printed, {CYCLES} cycles. {by}",
         encoding="utf-8",
     )
     cells = " × ".join(str(values.size) for values in SLOPE.values())
-    (given.folder / "model_trends.md").write_text(
-        f"{trends(given.tiny)}\nθ 8 to 14°, μs 0.25 to 0.45, PGA 0.05 to 1.2 g, 1 Hz, 15 cycles, {cells} cells; "
-        f"shares of the steps from one point of the grid to the next. {by}",
+    (options.folder / "model_trends.md").write_text(
+        f"{trends(options.tiny)}\nθ 8 to 14°, μs 0.25 to 0.45, PGA 0.05 to 1.2 g, 1 Hz, 15 cycles, "
+        f"{cells} cells; shares of the steps from one point of the grid to the next. {by}",
         encoding="utf-8",
     )
 

@@ -34,13 +34,13 @@ def timed(analyses: int, suite: Suite, model: Any, block: Callable[[Any], dict[s
     return result.permanent_displacement.size, time.process_time() - start
 
 
-def pyslammer_timed(found: dict[str, Any], analyses: int, share: int) -> Timed:
+def pyslammer_timed(motions_by_name: dict[str, Any], analyses: int, share: int) -> Timed:
     """Time pySLAMMER's loop on a share of the analyses, each motion in turn."""
     from pyslammer import RigidAnalysis
 
-    coefficients, scales = axes(analyses, len(found))
+    coefficients, scales = axes(analyses, len(motions_by_name))
     random = np.random.default_rng(1)
-    every = list(found.values())
+    every = list(motions_by_name.values())
     start = time.process_time()
     for index in range(share):
         motion = every[index % len(every)]
@@ -48,11 +48,13 @@ def pyslammer_timed(found: dict[str, Any], analyses: int, share: int) -> Timed:
     return share, time.process_time() - start
 
 
-def timing(found: dict[str, Any], g: float, analyses: int, share: int) -> str:
+def timing(motions_by_name: dict[str, Any], g: float, analyses: int, share: int) -> str:
     """Return the table of times."""
-    records = tuple(Record.sampled(motion.accel * g, motion.dt) for motion in found.values())
-    suite = Suite(records, tuple(found))
-    samples = float(np.mean([motion.accel.size for motion in found.values()]))
+    records = tuple(
+        Record.sampled(motion.accel * g, motion.dt) for motion in motions_by_name.values()
+    )
+    suite = Suite(records, tuple(motions_by_name))
+    samples = float(np.mean([motion.accel.size for motion in motions_by_name.values()]))
 
     def newmark(coefficients: Any) -> dict[str, Any]:
         return {"yield_coefficient": coefficients}
@@ -70,11 +72,11 @@ def timing(found: dict[str, Any], g: float, analyses: int, share: int) -> str:
     }
     for model, block, _ in runs.values():
         timed(1, suite, model, block)  # compiled, or loaded, before the clock starts
-    pyslammer_timed(found, analyses, 1)
+    pyslammer_timed(motions_by_name, analyses, 1)
     times = {
         name: timed(count, suite, model, block) for name, (model, block, count) in runs.items()
     }
-    peers = [pyslammer_timed(found, analyses, share) for _ in range(3)]
+    peers = [pyslammer_timed(motions_by_name, analyses, share) for _ in range(3)]
     times["pySLAMMER's loop"] = min(peers, key=lambda run: run[1])
     done, seconds = times["pySLAMMER's loop"]
     peer = seconds / done
@@ -96,17 +98,17 @@ def timing(found: dict[str, Any], g: float, analyses: int, share: int) -> str:
 
 def main() -> None:
     """Measure, and write the page."""
-    given = arguments(__doc__)
+    options = arguments(__doc__)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # pySLAMMER's own
         from pyslammer.constants import G_EARTH
 
-        found = motions()
-        if given.tiny:
-            found = dict(list(found.items())[-2:-1])
-        share = 2 if given.tiny else 4 * len(found)
-        times = timing(found, G_EARTH, 100 if given.tiny else 1_000_000, share)
-    (given.folder / "record_times.md").write_text(
+        motions_by_name = motions()
+        if options.tiny:
+            motions_by_name = dict(list(motions_by_name.items())[-2:-1])
+        share = 2 if options.tiny else 4 * len(motions_by_name)
+        times = timing(motions_by_name, G_EARTH, 100 if options.tiny else 1_000_000, share)
+    (options.folder / "record_times.md").write_text(
         "# Time of (ky, motion, scale) analyses\n\n"
         f"{measured_on(('numpy', 'numba', 'pyslammer'))} "
         "Made by `python -m benchmarks.record_times`.\n\n"

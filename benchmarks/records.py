@@ -67,7 +67,7 @@ def exact_displacement(motion: Any, g: float, ky: float = KY, factor: float = 1.
 
 
 def pynewmark_displacement(motion: Any, parts: int, g: float) -> float:
-    """pyNewmarkDisp's direct_newmark on a refined motion, m: accelerations in g, of which it makes 9.81 m/s²."""
+    """direct_newmark of pyNewmarkDisp on a refined motion, m; it takes g for 9.81 m/s²."""
     from pynewmarkdisp.newmark import direct_newmark
 
     values = refined(motion.accel, parts)
@@ -75,10 +75,10 @@ def pynewmark_displacement(motion: Any, parts: int, g: float) -> float:
     return float(direct_newmark(times, values, KY, 1.0)["perm_disp"]) * g / 9.81
 
 
-def agreement(found: dict[str, Any], g: float) -> str:
+def agreement(motions_by_name: dict[str, Any], g: float) -> str:
     """A row a motion: the exact answer, and by how much the others differ."""
     rows = []
-    for name, motion in found.items():
+    for name, motion in motions_by_name.items():
         exact = exact_displacement(motion, g)
         peers = [pyslammer_displacement(motion, parts) for parts in PARTS]
         peers += [pynewmark_displacement(motion, parts, g) for parts in (1, 16)]
@@ -88,7 +88,7 @@ def agreement(found: dict[str, Any], g: float) -> str:
     return table([*header, *(f"pyNewmarkDisp, Δt/{n}" for n in (1, 16))], rows)
 
 
-def slammer_runs(path: Path, found: dict[str, Any]) -> list[Run]:
+def slammer_runs(path: Path, motions_by_name: dict[str, Any]) -> list[Run]:
     """SLAMMER's rigid blocks, both ways, from the table of its results."""
     import pandas as pd
 
@@ -97,18 +97,21 @@ def slammer_runs(path: Path, found: dict[str, Any]) -> list[Run]:
         pd.read_excel(path).drop_duplicates(["Earthquake", "Record", "ky (g)"]).to_dict("records")
     ):
         name = f"{row['Earthquake'].replace('.', '').replace(' ', '_')}_{row['Record']}"
-        if name not in found:  # --tiny
+        if name not in motions_by_name:  # --tiny
             continue
-        factor = row["Scale"] / np.abs(found[name].accel).max()  # to a peak of `Scale` g
+        factor = row["Scale"] / np.abs(motions_by_name[name].accel).max()  # to a peak of `Scale` g
         for sign, column in ((1.0, "Rigid Normal (cm)"), (-1.0, "Rigid Inverse (cm)")):
             runs.append((name, float(row["ky (g)"]), sign * factor, 0.01 * row[column]))
     return runs
 
 
-def comparison(found: dict[str, Any], runs: list[Run], g: float) -> str:
-    """Another program's displacements over slipsweep's: slope, R², share within the tolerance; the worst, refined."""
+def comparison(motions_by_name: dict[str, Any], runs: list[Run], g: float) -> str:
+    """Another program's displacements over slipsweep's: slope, R², share within the tolerance.
+
+    The worst are refined.
+    """
     ours = np.array(
-        [exact_displacement(found[name], g, ky, factor) for name, ky, factor, _ in runs]
+        [exact_displacement(motions_by_name[name], g, ky, factor) for name, ky, factor, _ in runs]
     )
     theirs = np.array([run[-1] for run in runs])
     apart = np.abs(theirs - ours)
@@ -116,7 +119,9 @@ def comparison(found: dict[str, Any], runs: list[Run], g: float) -> str:
     rows = []
     for at in np.argsort(-apart / np.maximum(theirs, SMALL))[:5]:
         name, ky, factor, other = runs[at]
-        refined_runs = (pyslammer_displacement(found[name], parts, ky, factor) for parts in PARTS)
+        refined_runs = (
+            pyslammer_displacement(motions_by_name[name], parts, ky, factor) for parts in PARTS
+        )
         rows.append(
             [
                 name,
@@ -136,48 +141,51 @@ def comparison(found: dict[str, Any], runs: list[Run], g: float) -> str:
     ]
     return (
         f"{len(runs)} analyses: slope {(ours @ theirs) / (ours @ ours):.4f}, "
-        f"R² {np.corrcoef(ours, theirs)[0, 1] ** 2:.6f}, {within:.0%} within pySLAMMER's tolerance ({PART:.0%}; "
-        f"{1000 * METRES:g} mm below {1000 * SMALL:g} mm).\n\n{table(header, rows)}"
+        f"R² {np.corrcoef(ours, theirs)[0, 1] ** 2:.6f}, {within:.0%} within pySLAMMER's tolerance "
+        f"({PART:.0%}; {1000 * METRES:g} mm below {1000 * SMALL:g} mm).\n\n{table(header, rows)}"
     )
 
 
-def main(given: argparse.Namespace) -> Path:
+def main(options: argparse.Namespace) -> Path:
     """Measure, and write the page."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the peers' own
         from pyslammer.constants import G_EARTH
 
-        found = motions()
-        if given.tiny:
-            found = dict(list(found.items())[-2:-1])
-        agree = agreement(found, G_EARTH)
-        pairs = [(name, ky) for name in found for ky in EVERY_KY]
+        motions_by_name = motions()
+        if options.tiny:
+            motions_by_name = dict(list(motions_by_name.items())[-2:-1])
+        agree = agreement(motions_by_name, G_EARTH)
+        pairs = [(name, ky) for name in motions_by_name for ky in EVERY_KY]
         fits = {
             "pySLAMMER": [
-                (name, ky, 1.0, pyslammer_displacement(found[name], 1, ky)) for name, ky in pairs
+                (name, ky, 1.0, pyslammer_displacement(motions_by_name[name], 1, ky))
+                for name, ky in pairs
             ]
         }
-        if given.slammer:
-            fits["SLAMMER"] = slammer_runs(given.slammer, found)
+        if options.slammer:
+            fits["SLAMMER"] = slammer_runs(options.slammer, motions_by_name)
         compared = "".join(
-            f"**{name}.** {comparison(found, runs, G_EARTH)}\n" for name, runs in fits.items()
+            f"**{name}.** {comparison(motions_by_name, runs, G_EARTH)}\n"
+            for name, runs in fits.items()
         )
-    page = given.folder / "records.md"
+    page = options.folder / "records.md"
     page.write_text(
         "# Newmark's block on recorded motions\n\n"
         f"{measured_on(('numpy', 'numba', 'pyslammer', 'pynewmarkdisp'))} "
         "Made by `python -m benchmarks.records --slammer SLAMMER_results.xlsx`.\n\n"
         f"## Agreement, ky = {KY} g\n\n"
-        "slipsweep is exact for the straight lines between samples. The others' columns are their relative\n"
-        "difference from it. pySLAMMER sees onset and stop at samples only: refined, it converges to the exact\n"
-        "answer. It does not run a block out that still slides as the record ends. pyNewmarkDisp has another rule:\n"
-        "while Üg is below yield, its block loses the velocity |∫ Üg dt| instead of ∫ (Üy − Üg) dt, and is hardly\n"
-        "braked near Üg = 0; no refinement removes that.\n\n"
+        "slipsweep is exact for the straight lines between samples. The others' columns are their\n"
+        "relative difference from it. pySLAMMER sees onset and stop at samples only: refined, it\n"
+        "converges to the exact answer. It does not run a block out that still slides as the\n"
+        "record ends. pyNewmarkDisp has another rule: while Üg is below yield, its block loses\n"
+        "the velocity |∫ Üg dt| instead of ∫ (Üy − Üg) dt, and is hardly braked near Üg = 0; no\n"
+        "refinement removes that.\n\n"
         f"{agree}\n"
         "## SLAMMER and pySLAMMER against slipsweep\n\n"
-        "Both take the motions as they are sampled; where they differ most, pySLAMMER comes near as samples are "
-        "refined.\nSLAMMER 1.1: its own results, which pySLAMMER is verified against; the motions scaled, and both "
-        "ways.\n\n"
+        "Both take the motions as they are sampled; where they differ most, pySLAMMER comes near\n"
+        "as samples are refined. SLAMMER 1.1: its own results, which pySLAMMER is verified\n"
+        "against; the motions scaled, and both ways.\n\n"
         f"{compared}"
     )
     return Path(page)

@@ -75,17 +75,17 @@ def cycle_solver(tiny: bool) -> str:
             [*row, number(float(np.nanmedian(error)), 2), number(float(np.nanmax(error)), 2)]
         )
     grid = grids["design chart"]
-    found = slipsweep.sweep(**grid, variables=["sliding_mode"]).sliding_mode.values
+    modes = slipsweep.sweep(**grid, variables=["sliding_mode"]).sliding_mode.values
     shares = ", ".join(
-        f"{np.mean(found == mode):.0%} {mode.name.lower()}" for mode in slipsweep.SlidingMode
+        f"{np.mean(modes == mode):.0%} {mode.name.lower()}" for mode in slipsweep.SlidingMode
     )
     return (
         "## The cycle solver\n\n"
         + table(["cells", "number", "core time per cell, ns", "median error", "worst error"], rows)
-        + "\nTen cycles, displacement only. Core time is the elapsed time times the number of cores; "
-        "median over nine rounds of the best of three calls. "
-        f"Of the design chart {shares.replace('_', '–')}. Errors are relative, "
-        f"against 30 digits, over {sample.SIZE} random cells a regime (benchmarks/data/sample.csv).\n"
+        + "\nTen cycles, displacement only. Core time is the elapsed time times the number of "
+        "cores; median over nine rounds of the best of three calls. "
+        f"Of the design chart {shares.replace('_', '–')}. Errors are relative, against 30 digits, "
+        f"over {sample.SIZE} random cells a regime (benchmarks/data/sample.csv).\n"
     )
 
 
@@ -102,8 +102,8 @@ def four_dimensions(tiny: bool) -> str:
     if Path("/proc/self/clear_refs").exists():
         whole, result = peak_memory(tiny)
         memory = (
-            f" Sweeping {result / 1e6:,.0f} MB of result raises the memory of a process that has its kernels by "
-            f"{whole / result:.2f} times that, at its peak."
+            f" Sweeping {result / 1e6:,.0f} MB of result raises the memory of a process that has "
+            f"its kernels by {whole / result:.2f} times that, at its peak."
         )
     rows = [
         [name, number(seconds, 3), number(8 * cells / seconds / 1e9, 3)]
@@ -113,17 +113,20 @@ def four_dimensions(tiny: bool) -> str:
     return (
         f"## A 4-D sweep of {cells:,} cells\n\n"
         + table(["", "s", "GB/s written"], rows)
-        + f"\n{ratio:.2f} times the time that `np.full` takes for the same {8 * cells / 1e9:.2g} GB.{memory}\n"
+        + f"\n{ratio:.2f} times the time that `np.full` takes for the same "
+        f"{8 * cells / 1e9:.2g} GB.{memory}\n"
     )
 
 
 def peak_memory(tiny: bool) -> tuple[float, float]:
-    """Bytes that a sweep adds, at its peak, to a process that has swept before, and the bytes of its result."""
+    """Bytes that a sweep adds at its peak to a process that has swept, and bytes of its result."""
     code = (
         "import re, numpy as np, slipsweep, pathlib;"
-        "held = lambda name: int(re.search(name + r':\\s+(\\d+)', pathlib.Path('/proc/self/status').read_text())[1]);"
-        "run = lambda n: slipsweep.sweep(np.linspace(0, 20, 50), np.linspace(.2, .9, 50), np.linspace(.5, 13, n),"
-        " np.geomspace(.1, 20, 100), variables=['permanent_displacement']);"
+        "status = pathlib.Path('/proc/self/status');"
+        "held = lambda name: int(re.search(name + r':\\s+(\\d+)', status.read_text())[1]);"
+        "run = lambda n: slipsweep.sweep(np.linspace(0, 20, 50), np.linspace(.2, .9, 50),"
+        " np.linspace(.5, 13, n), np.geomspace(.1, 20, 100),"
+        " variables=['permanent_displacement']);"
         "run(2); before = held('VmRSS'); pathlib.Path('/proc/self/clear_refs').write_text('5');"
         f"found = run({4 if tiny else 200});"
         "print((held('VmHWM') - before) * 1024, found.nbytes)"
@@ -152,7 +155,8 @@ def waveforms(tiny: bool) -> str:
     return (
         "## Waveforms\n\n"
         + table(["waveform", "core time per cell, ns", "over the sine's"], rows)
-        + f"\nThe cycle solver, displacement only, ten cycles; {size_of(grid):,} cells of a design chart.\n"
+        + "\nThe cycle solver, displacement only, ten cycles; "
+        f"{size_of(grid):,} cells of a design chart.\n"
     )
 
 
@@ -199,8 +203,8 @@ def start_up(tiny: bool) -> str:
 
 def main() -> None:
     """Measure everything, write report.md."""
-    given = arguments(__doc__)
-    tiny = given.tiny
+    options = arguments(__doc__)
+    tiny = options.tiny
     parts = [
         "# What slipsweep takes\n\n"
         + measured_on(("numpy", "numba", "llvmlite", "xarray", "netCDF4")),
@@ -208,7 +212,7 @@ def main() -> None:
     ]
     for section in (cycle_solver, waveforms, four_dimensions, start_up):
         parts.append(section(tiny))
-        (given.folder / "report.md").write_text(
+        (options.folder / "report.md").write_text(
             "\n".join(parts)
         )  # what is measured stands, whatever comes after
 

@@ -55,9 +55,11 @@ class Group:
 
     def displacement(self, solver: Any) -> Array:
         """What a solver of `slipsweep.sweep` gives."""
-        given = {name: values for name, values in self.inputs.items() if not np.isnan(values).all()}
+        inputs = {
+            name: values for name, values in self.inputs.items() if not np.isnan(values).all()
+        }
         cells: dict[str, Any] = {
-            name: xr.DataArray(values, dims="cell") for name, values in given.items()
+            name: xr.DataArray(values, dims="cell") for name, values in inputs.items()
         }
         options: dict[str, Any] = {
             "model": self.model,
@@ -71,13 +73,13 @@ class Group:
 def read() -> dict[str, list[Group]]:
     """Groups of every regime."""
     rows = pd.read_csv(SAMPLE, float_precision="round_trip")
-    found: dict[str, list[Group]] = {regime: [] for regime in REGIMES}
-    given = [rows[name].notna() for name in INPUTS]
+    groups: dict[str, list[Group]] = {regime: [] for regime in REGIMES}
+    is_given = [rows[name].notna() for name in INPUTS]
     for (regime, model, *_), part in rows.groupby(
-        [rows.regime, rows.model, rows.sliding_mode, *given], sort=False
+        [rows.regime, rows.model, rows.sliding_mode, *is_given], sort=False
     ):
         inputs = {name: part[name].to_numpy(float) for name in INPUTS}
-        found[regime].append(
+        groups[regime].append(
             Group(regime, model, inputs, part.permanent_displacement.to_numpy(float))
         )
-    return found
+    return groups

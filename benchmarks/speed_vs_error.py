@@ -1,4 +1,4 @@
-"""What an error costs, by both solvers and by other programs: ``python -m benchmarks.speed_vs_error``.
+"""Time against error of both solvers and other programs: ``python -m benchmarks.speed_vs_error``.
 
 Writes speed_vs_error.csv and .png, and engines.md.  Cells are those of `benchmarks.sample`, one
 cycle each, over and over up to as many as fill batches and hide a call; those programs of
@@ -43,7 +43,7 @@ WANTED = (1e-3, 1e-6, 1e-9, 1e-12)
 
 @dataclass(frozen=True)
 class Point:
-    """A solver (cycle, a rule of the step solver, another program) with its steps or tolerance on one regime."""
+    """Solver (cycle, a rule of steps, another program) with its steps or tolerance on a regime."""
 
     solver: str
     setting: float
@@ -73,7 +73,7 @@ def measure(
     by: Any,
     cells: int,
 ) -> Point:
-    """A point from all groups of a regime, each repeated up to some cells and solved with the option `by`."""
+    """Point from all groups of a regime, each repeated up to `cells`, solved with option `by`."""
     seconds = 0.0
     errors = []
     for group in groups:
@@ -96,8 +96,8 @@ def points(tiny: bool) -> Iterator[Point]:
     """All points, one after the other; of other programs those of the installed ones."""
     few = np.arange(2)
     most = 64 if tiny else MOST_CELLS
-    found = sample.read()
-    for groups in found.values():
+    groups_of_regime = sample.read()
+    for groups in groups_of_regime.values():
         used = [groups[0].take(few)] if tiny else groups
         yield measure("cycle", 0, used, Group.displacement, "cycle", most)
         for rule in RULES:
@@ -108,39 +108,41 @@ def points(tiny: bool) -> Iterator[Point]:
                 )
     for name, program in engines.PROGRAMS.items():
         for regime in program.regimes if find_spec(name) else ():
-            group = engines.begin_at_yield(found[regime][0])
+            group = engines.begin_at_yield(groups_of_regime[regime][0])
             for setting in program.settings[: 1 if tiny else None]:
                 used, cells = ([group.take(few)], 1) if tiny else ([group], program.cells)
                 yield measure(name, setting, used, program.solve, setting, cells)
 
 
-def write_csv(found: list[Point], path: Path) -> None:
+def write_csv(measured: list[Point], path: Path) -> None:
     """Every point, as a line."""
     with path.open("w", newline="") as file:
         writer = csv.DictWriter(file, [field.name for field in fields(Point)], lineterminator="\n")
         writer.writeheader()
-        writer.writerows(asdict(point) for point in found)
+        writer.writerows(asdict(point) for point in measured)
 
 
 def coarsest(
-    found: list[Point], regimes: Sequence[str], solvers: Sequence[str], errors: Sequence[float]
+    measured: list[Point], regimes: Sequence[str], solvers: Sequence[str], errors: Sequence[float]
 ) -> str:
-    """A table of the coarsest settings with which 95 of 100 cells are within an error, and of their times."""
+    """Table of the coarsest settings with 95 of 100 cells within an error, and of their times."""
     rows = []
     for regime, solver in itertools.product(regimes, solvers):
-        own = [point for point in found if (point.solver, point.regime) == (solver, regime)]
+        of_solver = [
+            point for point in measured if (point.solver, point.regime) == (solver, regime)
+        ]
         row = [regime.replace("_", "–"), solver]
         for error in errors:
-            enough = [point for point in own if point.error_95 <= error]
+            enough = [point for point in of_solver if point.error_95 <= error]
             best = min(enough, key=lambda point: point.seconds_per_cell, default=None)
             setting = f" ({best.setting:g})" if best and best.setting else ""
             row.append(f"{number(best.seconds_per_cell * 1e6, 2)}{setting}" if best else "–")
-        if own:
+        if of_solver:
             rows.append(row)
     return table(["regime", "solver", *(f"{error:.0e}" for error in errors)], rows)
 
 
-def draw(found: list[Point], path: Path) -> None:
+def draw(measured: list[Point], path: Path) -> None:
     """Time against error, a panel a regime: down and to the left is better."""
     from matplotlib.figure import Figure
 
@@ -148,9 +150,11 @@ def draw(found: list[Point], path: Path) -> None:
     axes = figure.subplots(2, 2, sharex=True, sharey=True)
     for regime, axis in zip(REGIMES, axes.flat, strict=True):
         for solver, colour in COLOURS.items():
-            own = [point for point in found if (point.solver, point.regime) == (solver, regime)]
-            middle = np.maximum([point.median_error for point in own], 1e-17)
-            high = np.minimum(np.maximum([point.error_95 for point in own], middle), 1e3)
+            of_solver = [
+                point for point in measured if (point.solver, point.regime) == (solver, regime)
+            ]
+            middle = np.maximum([point.median_error for point in of_solver], 1e-17)
+            high = np.minimum(np.maximum([point.error_95 for point in of_solver], middle), 1e3)
             look: dict[str, Any] = {"marker": "o", "ms": 4, "label": f"step, {solver}"}
             if solver == "cycle":
                 look = {"marker": "*", "ms": 15, "label": solver}
@@ -162,7 +166,7 @@ def draw(found: list[Point], path: Path) -> None:
                     "label": solver,
                 }
             axis.errorbar(
-                [point.seconds_per_cell for point in own],
+                [point.seconds_per_cell for point in of_solver],
                 middle,
                 (np.zeros_like(middle), high - middle),
                 color=colour,
@@ -176,25 +180,27 @@ def draw(found: list[Point], path: Path) -> None:
     figure.supxlabel("processor time a cell, s")
     figure.supylabel("relative error of the displacement")
     figure.suptitle(
-        "What an error costs (median, whisker to the 95th percentile): down and to the left is better"
+        "What an error costs (median, whisker to the 95th percentile): "
+        "down and to the left is better"
     )
     figure.savefig(path, dpi=150)
 
 
 def main() -> None:
     """Measure, and write everything."""
-    given = arguments(__doc__)
-    found = list(points(given.tiny))
-    write_csv(found, given.folder / "speed_vs_error.csv")
-    (given.folder / "engines.md").write_text(
-        f"{coarsest(found, COMPARED, [*COLOURS], WANTED)}\n"
-        "Processor time a cell, µs, and in brackets the steps a cycle or the tolerance, of the fastest "
-        "setting with which 95 of 100 cells are within the relative error; “–”: none of those tried. "
+    options = arguments(__doc__)
+    measured = list(points(options.tiny))
+    write_csv(measured, options.folder / "speed_vs_error.csv")
+    (options.folder / "engines.md").write_text(
+        f"{coarsest(measured, COMPARED, [*COLOURS], WANTED)}\n"
+        "Processor time a cell, µs, and in brackets the steps a cycle or the tolerance, of the "
+        "fastest setting with which 95 of 100 cells are within the relative error; “–”: none of "
+        "those tried. "
         f"{measured_on(('numpy', 'numba', *engines.PROGRAMS))} "
         "Written by `python -m benchmarks.speed_vs_error`.\n",
         encoding="utf-8",
     )
-    draw(found, given.folder / "speed_vs_error.png")
+    draw(measured, options.folder / "speed_vs_error.png")
 
 
 if __name__ == "__main__":

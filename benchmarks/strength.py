@@ -1,4 +1,4 @@
-"""Error of the default steps where the strength changes while the block slides: ``python -m benchmarks.strength``.
+"""Error of the default steps if the strength changes in a slide: ``python -m benchmarks.strength``.
 
 Random cells by the default steps, against steps eight times as fine, which
 tests/kernels/test_changing_strength.py holds to SciPy's integrator.  Writes strength.md.
@@ -23,33 +23,33 @@ def random_cells(rng: np.random.Generator, count: int, strength: str) -> dict[st
     theta = rng.uniform(0.0, 15.0, count) * (rng.random(count) < 0.7)
     mu_s = np.tan(np.radians(theta)) + rng.uniform(0.03, 0.5, count)
     onset = slipsweep.Newmark().g * np.tan(np.arctan(mu_s) - np.radians(theta))
-    given = {
+    inputs = {
         "theta": theta,
         "mu_s": mu_s,
         "amplitude": onset * rng.uniform(1.01, 4.0, count),
         "frequency": 10.0 ** rng.uniform(-0.5, 1.0, count),
     }
     if strength == "weakening":
-        given["residual_mu"] = mu_s * rng.uniform(0.3, 1.0, count)
-        given["weakening_distance"] = 10.0 ** rng.uniform(-3.0, 0.0, count)
+        inputs["residual_mu"] = mu_s * rng.uniform(0.3, 1.0, count)
+        inputs["weakening_distance"] = 10.0 ** rng.uniform(-3.0, 0.0, count)
     else:
-        given["fast_mu"] = mu_s * rng.uniform(0.3, 1.6, count)
-        given["rate_constant"] = 10.0 ** rng.uniform(0.0, 2.2, count)
-    return {name: xr.DataArray(values, dims="case") for name, values in given.items()}
+        inputs["fast_mu"] = mu_s * rng.uniform(0.3, 1.6, count)
+        inputs["rate_constant"] = 10.0 ** rng.uniform(0.0, 2.2, count)
+    return {name: xr.DataArray(values, dims="case") for name, values in inputs.items()}
 
 
-def errors_of(given: dict[str, Any], model: slipsweep.Newmark) -> tuple[np.ndarray, float]:
+def errors_of(inputs: dict[str, Any], model: slipsweep.Newmark) -> tuple[np.ndarray, float]:
     """Return errors in u over the largest |u| of each cell, and the seconds that all cells took."""
     finer = slipsweep.Step("simpson", 8 * STRENGTH_STEPS.steps_per_cycle)
-    exact = slipsweep.sweep(**given, model=model, solver=finer)
+    exact = slipsweep.sweep(**inputs, model=model, solver=finer)
     started = time.perf_counter()
-    found = slipsweep.sweep(**given, model=model)
+    result = slipsweep.sweep(**inputs, model=model)
     took = time.perf_counter() - started
-    assert (found.validity == exact.validity).all()
+    assert (result.validity == exact.validity).all()
     moved = abs(exact.permanent_displacement)
     if model.sliding == "both":
         moved = np.maximum(exact.largest_displacement, -exact.smallest_displacement)
-    errors = abs(found.permanent_displacement - exact.permanent_displacement) / moved
+    errors = abs(result.permanent_displacement - exact.permanent_displacement) / moved
     return errors.values[np.isfinite(errors.values)], took
 
 
@@ -61,8 +61,8 @@ def row(name: str, sliding: str, errors: np.ndarray, time_of_cell: str) -> list[
 
 def main() -> None:
     """Write the table."""
-    given = arguments(__doc__)
-    count = 8 if given.tiny else 250
+    options = arguments(__doc__)
+    count = 8 if options.tiny else 250
     rng = np.random.default_rng(1)
     rows = []
     everything = []
@@ -80,7 +80,7 @@ def main() -> None:
         f"{measured_on()} Written by `python -m benchmarks.strength`."
     )
     text = f"{table(heading, rows)}\n{about}\n"
-    (given.folder / "strength.md").write_text(text, encoding="utf-8")
+    (options.folder / "strength.md").write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -66,9 +66,19 @@ autodoc_member_order = "bysource"
 python_maximum_signature_line_length = 88
 autosummary_generate_overwrite = True
 numpydoc_show_class_members = False  # the template of classes lists them
-# The parts that the docstring of every public object has.  Parameters that a function shares with
-# `sweep` are described there (so not PR01).
-numpydoc_validation_checks = {"GL08", "SS01", "SS03", "PR02", "PR07", "RT01", "SA01", "EX01"}
+# The parts that the docstring of every public object has.  Not PR01: the options of waveforms, and
+# the values of enumerations, are described as attributes.
+numpydoc_validation_checks = {
+    "GL08",
+    "SS01",
+    "SS03",
+    "PR02",
+    "PR03",
+    "PR07",
+    "RT01",
+    "SA01",
+    "EX01",
+}
 numpydoc_validation_exclude = {r"\.\w+\.\w+$"}  # methods and attributes
 
 html_theme = "pydata_sphinx_theme"

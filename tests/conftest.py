@@ -31,16 +31,20 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 @pytest.fixture(autouse=True, scope="session")
 def _no_power_cut() -> Iterator[None]:
-    """Nothing waits for the disk, which alone takes minutes on a slow one; processes that tests start do wait."""
+    """Do not wait for the disk, which takes minutes on a slow one; processes of tests do wait."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(os, "fsync", lambda descriptor: None)
         yield
-    gc.freeze()  # pytest ends by collecting garbage five times, for warnings of what is deleted: seconds
+    # pytest ends by collecting garbage five times, for warnings of what is deleted: seconds
+    gc.freeze()
 
 
 @pytest.fixture
 def without_layout() -> Iterator[None]:
-    """Draw charts once, not first to find room for their labels: half of the time; tests/charts has those with room."""
+    """Draw charts once, not first to find room for their labels, which takes half of the time.
+
+    tests/charts has those with room.
+    """
     from matplotlib.figure import Figure  # here: the settings above come first
 
     with pytest.MonkeyPatch.context() as patch:

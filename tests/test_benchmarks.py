@@ -69,11 +69,13 @@ def test_runs_and_writes(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPa
 def tables(path: Path) -> list[list[list[str]]]:
     """The tables of a Markdown file: heading and rows of each, and their cells."""
     blocks = re.findall(r"(?:^\|.*\n)+", path.read_text(encoding="utf-8"), re.MULTILINE)
-    found = []
+    lines_of_tables = []
     for block in blocks:
         heading, _, *rows = block.splitlines()
-        found.append([[cell.strip() for cell in row.split("|")[1:-1]] for row in (heading, *rows)])
-    return found
+        lines_of_tables.append(
+            [[cell.strip() for cell in row.split("|")[1:-1]] for row in (heading, *rows)]
+        )
+    return lines_of_tables
 
 
 def test_solvers_agree_on_a_few_cells(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -109,7 +111,7 @@ def test_other_waves_of_the_papers_peaks() -> None:
         .split("## Other waves of the same peaks")[1]
     )
     for wave in waves:
-        found = slipsweep.sweep(
+        result = slipsweep.sweep(
             5.0,
             0.38,
             3.55,
@@ -119,8 +121,8 @@ def test_other_waves_of_the_papers_peaks() -> None:
             delta_mu=0.09,
             excitation=wave,
         )
-        moved = 1000 * found.permanent_displacement.item()
-        quoted = f"{moved:.0f} mm and {found.peak_relative_velocity.item():.3f} m/s"
+        moved = 1000 * result.permanent_displacement.item()
+        quoted = f"{moved:.0f} mm and {result.peak_relative_velocity.item():.3f} m/s"
         assert quoted in " ".join(text.split()), wave
 
 

@@ -1,4 +1,4 @@
-"""Everything public is in the reference, and the examples in its docstrings run and print what they say."""
+"""Everything public is in the reference, and the examples in its docstrings run."""
 
 import doctest
 import shutil
@@ -49,7 +49,7 @@ def test_the_example_of_the_accessor_runs() -> None:
 
 
 def test_the_reference_lists_everything_public() -> None:
-    """The site's build fails on a name that is listed and not there; this is the other way round."""
+    """The site's build fails on a name that is listed and not there; this on one not listed."""
     lines = (ROOT / "docs" / "site" / "python.rst").read_text(encoding="utf-8").splitlines()
     equations = {f"published.{name}" for name in EQUATIONS}
     module = ".. automodule:: slipsweep.published"

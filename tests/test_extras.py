@@ -1,4 +1,4 @@
-"""What needs an extra works with that extra alone, and says in one line how to install it without."""
+"""A feature works with its extra alone; without it a line says how to install it."""
 
 import json
 import os
@@ -25,7 +25,8 @@ LINES = {
     "cluster": ["run a.toml -o b.nc -q --workers 1"],
 }
 
-#: Runs the lines with the packages that slipsweep itself needs, then those of each extra with its packages as well.
+#: Runs the lines with the packages that slipsweep itself needs, then those of each extra with its
+#: packages as well.
 BARE = """
 import contextlib, io, json, os, sys
 from importlib import metadata

@@ -21,6 +21,7 @@ import slipsweep
 from slipsweep.files import spec
 from slipsweep.model.choices import declared
 from slipsweep.model.options import MODELS, SOLVERS
+from slipsweep.model.parameter_table import PARAMETER_TABLE
 from slipsweep.model.variables import DIMENSION_ORDER, Validity
 from slipsweep.motion.reading import Reading
 from slipsweep.motion.waveforms import WAVEFORMS
@@ -46,7 +47,7 @@ NOT_RUN = (
 
 
 class Block(NamedTuple):
-    """A fenced block: its language, the line it begins in, its text, and the file that the reader saves it as."""
+    """A fenced block: language, first line, text, and the file that the reader saves it as."""
 
     language: str
     line: int
@@ -119,7 +120,7 @@ def output_of(arguments: list[str], folder: Path) -> str:
 
 
 def printed_by(text: str, where: str, folder: Path) -> str:
-    """What a reader's program prints, run in this process, which has imported everything already."""
+    """Output of a reader's program, run in this process, which has imported everything already."""
     assert "slipsweep." not in text or "import slipsweep" in text, where
     output = io.StringIO()
     errors = io.StringIO()
@@ -158,14 +159,14 @@ def test_blocks_about_statistics_of_suites_do_what_they_say(tmp_path: Path) -> N
         read("docs/suites.md").split(f"\n## {name}\n")[0].count("\n")
         for name in ("Statistics", "What else takes a suite")
     )
-    found = [block for block in blocks("docs/suites.md") if begin < block.line < end]
-    assert [block.language for block in found] == ["console", "python", "text", "csv", "console"]
-    run_blocks("docs/suites.md", found, tmp_path)
+    chosen = [block for block in blocks("docs/suites.md") if begin < block.line < end]
+    assert [block.language for block in chosen] == ["console", "python", "text", "csv", "console"]
+    run_blocks("docs/suites.md", chosen, tmp_path)
 
 
-def run_blocks(document: str, found: list[Block], tmp_path: Path) -> None:
+def run_blocks(document: str, chosen: list[Block], tmp_path: Path) -> None:
     shutil.copytree(ROOT / "sweeps", tmp_path / "sweeps")
-    for block, after in zip_longest(found, found[1:]):
+    for block, after in zip_longest(chosen, chosen[1:]):
         where = f"{document}, line {block.line}"
         if block.language == "console":
             for (program, *arguments), expected in commands(block.text):
@@ -286,7 +287,7 @@ def test_comparison_with_the_paper() -> None:
         five_cycles(STICK_SLIP, 1.8, decay_rate=2.70),
         five_cycles(CONTINUOUS, 3.5, decay_rate=2.30),
     )
-    own = five_cycles(STICK_SLIP, 1.8), five_cycles(CONTINUOUS, 3.5)
+    of_paper = five_cycles(STICK_SLIP, 1.8), five_cycles(CONTINUOUS, 3.5)
     computed = [
         eqs("limiting_acceleration"),
         eqs("acceleration_ratio"),
@@ -295,14 +296,14 @@ def test_comparison_with_the_paper() -> None:
         eqs("decay_rate"),
         (f"{attenuation:.3f}", "–"),
         *zip(*printed, strict=True),
-        *zip(*own, strict=True),
+        *zip(*of_paper, strict=True),
     ]
     for (quantity, values), expected in zip(stated.items(), computed, strict=True):
         assert values == expected, quantity
 
 
 def test_numbers_of_the_paper_sweep() -> None:
-    """340 mm and 0.299 m/s, 162 mm and 0.227 m/s: with the rounded friction above static of Table 2."""
+    """340 mm and 0.299 m/s, 162 mm and 0.227 m/s: with the rounded friction of Table 2."""
     text = " ".join(section("docs/tutorial.md", "## Against the paper").split())
     for experiment, frequency, decay_rate, delta_mu in (
         (STICK_SLIP, 1.8, 2.70, 0.09),
@@ -362,7 +363,7 @@ def test_keys_are_those_of_the_schema(heading: str) -> None:
     families: dict[str, Any] = {"model": MODELS, "excitation": WAVEFORMS, "solver": SOLVERS}
     options = dict(families[table].options) if table in families else {}
     if table == "excitation":
-        options |= {one.name: one for one in declared(Reading)}
+        options |= {option.name: option for option in declared(Reading)}
     for name, default in spec.KEYS[table].items():
         stated = keys[name][2].strip("`")
         default = options[name].default if name in options else default
@@ -372,10 +373,23 @@ def test_keys_are_those_of_the_schema(heading: str) -> None:
             assert stated.replace('"', "'") == repr(default), name
 
 
+def test_units_and_bounds_of_parameters_are_those_of_the_program() -> None:
+    """A document with other numbers would promise values that are then refused."""
+    table = rows(section("docs/sweep-files.md", "## `[axes.NAME]`"))
+    stated = {row[0].strip("`"): (row[1].strip("`"), row[2]) for row in table if row[1] != "type"}
+    for row in PARAMETER_TABLE:
+        if row.name != "polarity":  # a key of [excitation]
+            unit, allowed = stated[row.name]
+            assert unit == row.units, row.name
+            assert allowed == row.bound.brief, row.name
+
+
 def test_published_equations_are_those_of_the_program() -> None:
     table = rows(section("docs/published.md", "## The equations"))[1:]
     stated = [(name.strip("`"), deviation, limits) for name, _, deviation, limits in table]
-    assert stated == [(one.name, one.deviation, one.range_text) for one in EQUATIONS.values()]
+    assert stated == [
+        (equation.name, equation.deviation, equation.range_text) for equation in EQUATIONS.values()
+    ]
 
 
 def test_the_table_of_contents_of_a_file_names_every_dimension() -> None:

@@ -36,9 +36,9 @@ class RunError(RuntimeError):
     >>> suite = slipsweep.read_suite("sweeps/data/suite/rock*_H1.AT2")
     >>> result = slipsweep.sweep(theta=30, mu_s=0.3, amplitude=[2.0, 4.0], excitation=suite)
     >>> curve = slipsweep.HazardCurve(amplitude=[1.0, 5.0], rate=[1e-2, 1e-4])
-    >>> slipsweep.displacement_hazard(result, curve)
+    >>> slipsweep.displacement_hazard(result, curve)  # doctest: +ELLIPSIS
     Traceback (most recent call last):
-    slipsweep.errors.RunError: no annual rate: the model gives no value under any motion at two amplitudes or more
+    slipsweep.errors.RunError: no annual rate: the model gives no value under any motion ...
     """
 
 
@@ -59,10 +59,9 @@ def check_extra(what: str, extra: str, *packages: str, otherwise: str = "") -> N
         )
 
 
-def did_you_mean(word: str, known: Sequence[str]) -> str:
-    """Suggest the nearest known name, or tell all of them."""
-    near = [one for one in known if len(word) > 3 and word in one] or difflib.get_close_matches(
-        word, known, n=1
-    )
-    quoted = " or ".join(f'"{one}"' for one in near)
-    return f"did you mean {quoted}?" if near else f"known here: {', '.join(known)}"
+def did_you_mean(word: str, names: Sequence[str]) -> str:
+    """Suggest the nearest of some names, or tell all of them."""
+    near = [name for name in names if len(word) > 3 and word in name]
+    near = near or difflib.get_close_matches(word, names, n=1)
+    quoted = " or ".join(f'"{name}"' for name in near)
+    return f"did you mean {quoted}?" if near else f"known here: {', '.join(names)}"

@@ -2,7 +2,7 @@
 
 One function for each equation. All take the yield coefficient ky and the peak ground acceleration
 in g, and return an `Estimate`: the median in m, the standard deviation of ln u, the probability of
-no displacement, and whether the inputs lie in the range that the equation was made for.  Arrays are
+no displacement, and True if the inputs lie in the range that the equation was made for.  Arrays are
 combined as NumPy combines them.  A block with ky of at least the peak ground acceleration does not
 slide, whatever the fit gives.
 
@@ -57,7 +57,7 @@ Values = float | Sequence[float] | Floats
 _LN_10 = math.log(10.0)
 _LN_CM = math.log(100.0)
 
-#: What the inputs are, with their units.
+#: Words for the inputs, with their units.
 INPUTS = {
     "yield_coefficient": "yield coefficient ky",
     "pga": "peak ground acceleration, g",
@@ -106,7 +106,10 @@ class Estimate(NamedTuple):
     in_range: Any
 
     def quantile(self, share: Values) -> Any:
-        """Displacement that a `share` of all cases does not exceed, m; zero displacements count."""
+        """Return the displacement that a `share` of all cases does not exceed, m.
+
+        Zero displacements count.
+        """
         from scipy.special import ndtri
 
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -118,7 +121,7 @@ class Estimate(NamedTuple):
         return np.where(np.isnan(self.median), np.nan, value)[()]
 
     def exceedance_probability(self, displacement: Values) -> Any:
-        """Probability that the displacement is larger than `displacement`, m."""
+        """Return the probability that the displacement is larger than `displacement`, m."""
         from scipy.special import ndtr
 
         limit = np.asarray(displacement, np.float64)
@@ -138,7 +141,7 @@ class Equation:
     Attributes
     ----------
     name : str
-        What ``--equations`` takes.
+        Name that ``--equations`` takes.
     label : str
         Authors and year, for legends.
     function : callable
@@ -181,31 +184,31 @@ class Equation:
     def required(self) -> tuple[str, ...]:
         """Names of the inputs that have no default."""
         parameters = inspect.signature(self.function).parameters.values()
-        return tuple(one.name for one in parameters if one.default is one.empty)
+        return tuple(each.name for each in parameters if each.default is each.empty)
 
     @property
     def range_text(self) -> str:
-        """The range in words: ``ky/PGA 0.1 to 0.9``."""
+        """Range in words: ``ky/PGA 0.1 to 0.9``."""
         names = {"ratio": "ky/PGA", "yield_coefficient": "ky", "magnitude": "M"}
-        parts = (f"{names[one]} {low:g} to {high:g}" for one, (low, high) in self.bounds.items())
+        parts = (f"{names[name]} {low:g} to {high:g}" for name, (low, high) in self.bounds.items())
         return ", ".join(parts)
 
 
 def check_equations(names: Any) -> tuple[str, ...]:
     """Return the names of equations, each once (InputError: there is no such equation)."""
     listed = names.split(",") if isinstance(names, str) else check_list("equations", names, "names")
-    found = dict.fromkeys(str(name).strip() for name in listed)
-    for name in found:
+    once = dict.fromkeys(str(name).strip() for name in listed)
+    for name in once:
         if name not in EQUATIONS:
             hint = did_you_mean(name, [*EQUATIONS])
             raise InputError(f"equations = {shown(name)}: no such published equation; {hint}")
-    return tuple(found)
+    return tuple(once)
 
 
-def _checked(**given: Any) -> dict[str, Floats]:
-    """Inputs as arrays (InputError: not above zero, or too large); NaN stays."""
+def _checked(**arguments: Any) -> dict[str, Floats]:
+    """Return inputs as arrays (InputError: not above zero, or too large); NaN is allowed."""
     inputs = {}
-    for name, values in given.items():
+    for name, values in arguments.items():
         array = check_numbers(name, values)
         most = _MOST.get(name, math.inf)
         allowed = np.isnan(array) | ((array > 0.0) & (array <= most) & np.isfinite(array))
@@ -218,7 +221,7 @@ def _checked(**given: Any) -> dict[str, Floats]:
 
 
 def _ratio(inputs: Mapping[str, Floats]) -> Floats:
-    """ky over the peak ground acceleration; NaN where the block does not slide."""
+    """Return ky over the peak ground acceleration; NaN where the block does not slide."""
     ratio = inputs["yield_coefficient"] / inputs["pga"]
     return np.where(ratio < 1.0, ratio, np.nan)
 
@@ -243,7 +246,7 @@ def _estimate(
     deviation = np.where(rests, 0.0, log_standard_deviation)
     zero = np.where(rests, 1.0, zero_probability)
     parts = (median, deviation, zero, in_range)
-    return Estimate(*(np.broadcast_to(one, shape)[()] for one in parts))
+    return Estimate(*(np.broadcast_to(part, shape)[()] for part in parts))
 
 
 def ambraseys_menu_1988(yield_coefficient: Values, pga: Values) -> Estimate:
@@ -263,7 +266,7 @@ def ambraseys_menu_1988(yield_coefficient: Values, pga: Values) -> Estimate:
     Returns
     -------
     Estimate
-        Median (m), standard deviation of ln u, and whether the inputs are in the range.
+        Median (m), standard deviation of ln u, and True if the inputs are in the range.
 
     Raises
     ------
@@ -308,7 +311,7 @@ def jibson_2007(yield_coefficient: Values, pga: Values) -> Estimate:
     Returns
     -------
     Estimate
-        Median (m), standard deviation of ln u, and whether the inputs are in the range.
+        Median (m), standard deviation of ln u, and True if the inputs are in the range.
 
     Raises
     ------
@@ -354,7 +357,7 @@ def jibson_2007_magnitude(yield_coefficient: Values, pga: Values, magnitude: Val
     Returns
     -------
     Estimate
-        Median (m), standard deviation of ln u, and whether the inputs are in the range.
+        Median (m), standard deviation of ln u, and True if the inputs are in the range.
 
     Raises
     ------
@@ -399,7 +402,7 @@ def saygili_rathje_2008(yield_coefficient: Values, pga: Values) -> Estimate:
     Returns
     -------
     Estimate
-        Median (m), standard deviation of ln u, and whether the inputs are in the range.
+        Median (m), standard deviation of ln u, and True if the inputs are in the range.
 
     Raises
     ------
@@ -448,7 +451,7 @@ def saygili_rathje_2008_pgv(yield_coefficient: Values, pga: Values, pgv: Values)
     Returns
     -------
     Estimate
-        Median (m), standard deviation of ln u, and whether the inputs are in the range.
+        Median (m), standard deviation of ln u, and True if the inputs are in the range.
 
     Raises
     ------
@@ -498,7 +501,7 @@ def rathje_saygili_2009(yield_coefficient: Values, pga: Values, magnitude: Value
     Returns
     -------
     Estimate
-        Median (m), standard deviation of ln u, and whether the inputs are in the range.
+        Median (m), standard deviation of ln u, and True if the inputs are in the range.
 
     Raises
     ------
@@ -550,7 +553,7 @@ def bray_travasarou_2007(yield_coefficient: Values, pga: Values, magnitude: Valu
     -------
     Estimate
         Median (m) and standard deviation of ln u where it is not zero, the probability of zero, and
-        whether the inputs are in the range.
+        True if the inputs are in the range.
 
     Raises
     ------

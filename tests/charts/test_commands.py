@@ -142,3 +142,20 @@ def test_a_spoilt_result_is_refused_in_one_line(spoil: Any, message: str) -> Non
     changed = spoil(data)
     with pytest.raises(InputError, match=message):
         (changed if isinstance(changed, xr.Dataset) else data).slipsweep.chart("families")
+
+
+def test_a_history_is_drawn_alike_by_command_file_and_accessor(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a history: by `simulate`, of its file by `chart`, and of its dataset."""
+    monkeypatch.chdir(tmp_path)
+    given = ["--theta", "5", "--mu-s", "0.38", "--amplitude", "3.55", "--frequency", "1.8"]
+    assert main(["simulate", *given, "-o", "a.nc", "-o", "a.png", "-q"]) == 0
+    assert main(["chart", "a.nc", "-o", "b.png"]) == 0
+    assert Path("a.png").read_bytes() == Path("b.png").read_bytes()
+    figure = slipsweep.simulate(5.0, 0.38, 3.55, 1.8).slipsweep.chart()
+    figure.savefig("c.png", dpi=150)
+    assert Path("a.png").read_bytes() == Path("c.png").read_bytes()
+    assert main(["chart", "a.nc", "--kind", "modes"]) == 2
+    assert main(["chart", "a.nc", "--at", "theta=5", "-o", "d.png"]) == 2
+    assert not Path("d.png").exists()

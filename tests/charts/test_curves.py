@@ -8,8 +8,8 @@ import pytest
 import xarray as xr
 
 import slipsweep
-from slipsweep.charts import solved
 from slipsweep.cli import main
+from slipsweep.studies.cautions import percent
 from tests.support.charts import (
     AMPLITUDES,
     FREQUENCIES,
@@ -162,7 +162,7 @@ def test_a_single_point_is_barred_too_and_angles_are_not_logarithmic() -> None:
     figure.draw_without_rendering()
     label = figure.axes[0].yaxis.label.get_window_extent()
     assert label.y1 <= figure.legends[0].get_window_extent().y0
-    assert [solved.percent(share) for share in (1.0, 0.996, 0.054, 0.00312)] == [
+    assert [percent(share) for share in (1.0, 0.996, 0.054, 0.00312)] == [
         "100 %",
         "100 %",
         "5.4 %",

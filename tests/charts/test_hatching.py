@@ -8,9 +8,10 @@ import pytest
 import xarray as xr
 
 import slipsweep
-from slipsweep.charts import maps, solved, style
+from slipsweep.charts import style
 from slipsweep.charts.slices import Result
 from slipsweep.model.variables import NOTES
+from slipsweep.studies.cautions import unsound_texts
 from tests.support.charts import (
     LINED_SINE,
     SINE,
@@ -46,11 +47,6 @@ def test_hatching_is_where_validity_says_so(grid: xr.Dataset, x: str) -> None:
         assert all(patch.hatches[0] for patch in patches)
         seen += covered.sum()
     assert seen > 0
-
-
-def test_all_flags_but_notes_have_a_hatch_of_their_own() -> None:
-    assert slipsweep.Validity(sum(maps.HATCHES)) == ~NOTES
-    assert len({*maps.HATCHES.values(), maps.UNSOUND_HATCH}) == len(maps.HATCHES) + 1
 
 
 def test_what_no_block_does_is_marked_and_its_share_told(lined: xr.Dataset) -> None:
@@ -123,7 +119,7 @@ def test_shares_of_what_is_unsound_are_those_of_all_cells() -> None:
     result = slipsweep.sweep(*axes)
     slides = result.permanent_displacement.where(~slipsweep.flags(result).not_recoupled) > 0
     estimated = slides & (result.sliding_mode == 2) & slipsweep.flags(result).friction_estimated
-    trends, continuous = solved.unsound_texts(result)
+    trends, continuous = unsound_texts(result)
     share, counted = re.findall(
         r"^([\d.]+) % .* \(counted in (\d+) cells, evenly spaced\)$", continuous
     )[0]

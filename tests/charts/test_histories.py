@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 
 import slipsweep
 from slipsweep.model.options import Model
-from tests.support.charts import SWEEPS, caption
+from tests.support.charts import SWEEPS, caption, named
 
 
 def lines_of(axes: Axes) -> dict[str, Any]:
@@ -139,3 +139,23 @@ def test_constant_friction_is_the_first_word_of_the_caption(friction: xr.Dataset
     told = friction.assign_attrs(constant_friction=sentence).slipsweep.chart()
     assert told.get_supxlabel().startswith(f"{sentence}\nθ = 5°, μs = 0.38; shaded")
     assert friction.slipsweep.chart().get_supxlabel().startswith("θ = 5°, μs = 0.38; shaded")
+
+
+def test_every_half_wave_of_a_history_has_its_mode() -> None:
+    """As many of each mode as the solver counted, and the times are zeros of the record."""
+    record = slipsweep.read_record(SWEEPS / "data" / "synthetic.csv")
+    given: dict[str, Any] = {"excitation": record, "scale": 2.5, "time_scale": 2.0, "polarity": -1}
+    history = slipsweep.simulate(5.0, 0.35, **given)
+    assert history.half_wave_peak.units == history.ground_acceleration.units == "m s-2"
+    modes = history.half_wave_mode.values
+    assert np.count_nonzero(modes == 1) == history.stick_slip_pulses
+    assert np.count_nonzero(modes == 2) == history.continuous_pulses
+    assert (
+        min(history.stick_slip_pulses, history.continuous_pulses, np.count_nonzero(modes == 0)) > 0
+    )
+    figure = history.slipsweep.chart("history")
+    for name, mode in (("stuck", 0), ("stick_slip", 1), ("continuous", 2)):
+        (boxes,) = named(figure, name)
+        spans = np.array([path.get_extents().intervalx for path in boxes.get_paths()])
+        np.testing.assert_allclose(spans[:, 0], history.half_wave_start[modes == mode], rtol=1e-12)
+        np.testing.assert_allclose(spans[:, 1], history.half_wave_end[modes == mode], rtol=1e-12)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.figure import Figure
 
 import slipsweep
 from slipsweep.model.variables import LimitStatus
@@ -153,3 +154,50 @@ def test_rates_that_come_from_above_the_amplitudes_are_dotted(result: xr.Dataset
     assert not figure.legends  # the caption has what the curve is of
     assert "θ = 5°, μs = 0.3" in caption(figure)
     assert "Rates are computed at the markers" not in caption(figure)
+
+
+def test_limits_of_motions_that_do_not_reach_the_displacement_are_above_all_others(
+    suite: slipsweep.Suite,
+) -> None:
+    """The median counts them; the caption says how many they are."""
+    limits = slipsweep.limit_amplitude(
+        0.05, 5.0, [0.3, 0.4], excitation=suite, maximum_amplitude=7.2, model="newmark"
+    )
+    missing = limits.limit_amplitude.isnull().sum("motion").values
+    assert 0 < missing[-1] < 4
+    figure = limits.slipsweep.chart()
+    (median,) = named(figure, "median")
+    ordered = np.sort(limits.limit_amplitude.fillna(np.inf).values, axis=-1)
+    np.testing.assert_allclose(median.get_ydata(), ordered[:, 3:5].mean(axis=1) / 9.81, rtol=1e-12)
+    assert len(named(figure, "motion")) == 8
+    assert f"{missing.sum()} of 16 limits are above {7.2 / 9.81:.4g} g;" in caption(figure)
+    # where nothing varies but the motion, they lie along the abscissa
+    axes = Figure().subplots()
+    assert limits.isel(mu_s=0).slipsweep.chart(ax=axes) is axes
+    assert [text.get_text() for text in axes.get_xticklabels()] == list(suite.labels)
+
+
+def test_rates_beyond_the_end_of_the_hazard_curve_are_named(result: xr.Dataset) -> None:
+    curve = slipsweep.HazardCurve(np.array([0.5, 10.0]), np.array([1e-2, 1e-5]))
+    rates = slipsweep.displacement_hazard(result.sel(theta=5.0), curve, [0.001, 0.01, 0.1])
+    axes = Figure().subplots()
+    assert rates.slipsweep.chart(ax=axes) is axes
+    figure = slipsweep.displacement_hazard(
+        result.sel(mu_s=0.3), curve, [0.001, 0.01, 0.1]
+    ).slipsweep.chart()
+    assert legend(figure) == ["θ = 5°", "θ = 20°"]
+    short = slipsweep.HazardCurve(np.array([0.5, 4.0]), np.array([1e-2, 8e-3]))
+    figure = slipsweep.displacement_hazard(
+        result.sel(theta=5.0), short, [0.001, 0.01]
+    ).slipsweep.chart()
+    assert "above the end of the hazard curve, where" in caption(figure)
+    figure.draw_without_rendering()
+    assert not any(
+        "times" in text.get_text() for text in figure.axes[0].get_xticklabels(which="both")
+    )
+    marks = [line for line in axes.lines if line.get_marker() not in ("", "None", None)]
+    for line, mu_s in zip(marks, rates.mu_s, strict=True):
+        expected = rates.annual_rate.sel(mu_s=mu_s).values
+        np.testing.assert_allclose(
+            line.get_ydata()[expected > 0], expected[expected > 0], rtol=1e-12
+        )

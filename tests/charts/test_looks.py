@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 import slipsweep
@@ -171,3 +172,22 @@ def test_charts_of_zeros_of_nothing_and_of_one_value(grid: xr.Dataset) -> None:
     )
     for line in labelled(figure, "f = "):  # a line through one point is none: it has a marker
         assert np.isfinite(line.get_ydata()[np.asarray(line.get_markevery())]).tolist() == [True]
+
+
+def test_a_chart_in_axes_of_another_figure() -> None:
+    """Map and curves of a sweep, side by side, each with its legend and caption."""
+    sweep = slipsweep.sweep(
+        [2.0, 5.0], 0.4, np.linspace(2, 8, 9), [1.0, 2.0, 4.0], excitation=slipsweep.Sine(cycles=3)
+    )
+    figure = Figure(figsize=(12, 5), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    assert sweep.slipsweep.chart("contours", ax=left, at={"theta": 5}) is left
+    assert sweep.slipsweep.chart("families", ax=right, at={"theta": 5}, y="frequency") is right
+    assert [line for line in right.lines if str(line.get_label()).startswith("f = ")]
+    for axes in (left, right):
+        assert axes.get_legend() is not None
+        assert any("Mendez et al. 2012" in text.get_text() for text in axes.texts)
+    assert not figure.legends
+    figure.draw_without_rendering()
+    boxes = [axes.get_tightbbox() for axes in (left, right)]
+    assert boxes[0].x1 <= boxes[1].x0  # nothing of one lies in the other

@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 import slipsweep
-from slipsweep.charts import solved
+from slipsweep.studies.cautions import percent
 from tests.support.charts import SUITE_AMPLITUDES, caption, drawn_as, legend, named
 
 G = 9.81
@@ -161,6 +161,6 @@ def test_the_caption_counts_zeros_and_shares_of_cautions(result: xr.Dataset) -> 
     flagged.validity.loc[two] |= int(slipsweep.Validity.NOT_RECOUPLED)
     text = caption(flagged.slipsweep.chart("motions", show_cautions=True))
     assert f"Zero displacement: up to {int(zeros.max())} of 16; they lie below" in text
-    share = solved.percent(2 / flagged.validity.size)
+    share = percent(2 / flagged.validity.size)
     cautions = "Statistics are of all values, also those with a caution: not_recoupled"
     assert f"{cautions} {share}." in text

@@ -26,9 +26,9 @@ def test_friction_writes_what_it_finds(capsys: pytest.CaptureFixture[str]) -> No
     assert "8 slides" in printed
     assert "removed    nothing" in printed
     assert Path("friction.png").read_bytes().startswith(b"\x89PNG")
-    with xr.open_dataset("friction.nc") as found:
-        assert found.sizes["slide"] == 8
-        assert found.friction_ratio.dims == ("instant",)
+    with xr.open_dataset("friction.nc") as friction:
+        assert friction.sizes["slide"] == 8
+        assert friction.friction_ratio.dims == ("instant",)
     figure = slipsweep.open_result("friction.nc").slipsweep.chart("friction")
     figure.savefig("again.png", dpi=150)
     assert Path("again.png").read_bytes() == Path("friction.png").read_bytes()
@@ -38,9 +38,9 @@ def test_friction_takes_offsets_off_by_the_rest(capsys: pytest.CaptureFixture[st
     assert cli.main(["friction", TEST, *BLOCK, "--offset", "all", "--rest", "0", "0.45"]) == 0
     assert "removed    ground_acceleration: " in capsys.readouterr().out
     assert cli.main(["friction", TEST, *BLOCK, "--g", "9.7", "-o", "g.nc"]) == 0
-    with xr.open_dataset("g.nc") as found:
+    with xr.open_dataset("g.nc") as friction:
         expected = slipsweep.measured_friction(TEST, 5.0, 0.38, g=9.7).free_body_friction
-        np.testing.assert_array_equal(found.free_body_friction, expected)
+        np.testing.assert_array_equal(friction.free_body_friction, expected)
 
 
 def test_calibrate_writes_what_it_finds(capsys: pytest.CaptureFixture[str]) -> None:
@@ -51,11 +51,13 @@ def test_calibrate_writes_what_it_finds(capsys: pytest.CaptureFixture[str]) -> N
     )
     printed = capsys.readouterr().out
     assert "[uncertainty.decay_rate]" in printed
-    with xr.open_dataset("calibration.nc") as found:
-        assert abs(found.yield_acceleration - 1.8) < 3.5 * found.yield_acceleration_error
-        assert found.sizes["cycle"] == 8
-        assert "constant_friction" in found.attrs
-        misfit = f"misfit {1000 * found.misfit_relative_displacement.item():.2g} mm"
+    with xr.open_dataset("calibration.nc") as calibration:
+        assert (
+            abs(calibration.yield_acceleration - 1.8) < 3.5 * calibration.yield_acceleration_error
+        )
+        assert calibration.sizes["cycle"] == 8
+        assert "constant_friction" in calibration.attrs
+        misfit = f"misfit {1000 * calibration.misfit_relative_displacement.item():.2g} mm"
     assert misfit in Path("calibration.svg").read_text()
     assert Path("model.toml").read_text() in printed
     assert "[uncertainty.decay_rate]" in Path("model.toml").read_text()
@@ -63,9 +65,9 @@ def test_calibrate_writes_what_it_finds(capsys: pytest.CaptureFixture[str]) -> N
     check_figure(slipsweep.open_result("calibration.nc").load())
 
 
-def check_figure(found: xr.Dataset) -> None:
+def check_figure(calibration: xr.Dataset) -> None:
     """Each panel has what was measured and what was computed, in the unit of its label."""
-    figure = found.slipsweep.chart()
+    figure = calibration.slipsweep.chart()
     channels = {
         "ground_acceleration": ("acceleration of\nthe table (m/s²)", 1.0, "smooth"),
         "block_acceleration": ("acceleration of\nthe block (m/s²)", 1.0, "computed"),
@@ -78,14 +80,14 @@ def check_figure(found: xr.Dataset) -> None:
         assert axes.get_ylabel() == label
         lines = {str(line.get_label()): line for line in axes.lines}
         for name, kind in (("measured", "measured"), (computed, "computed")):
-            expected = factor * found[f"{kind}_{channel}"]
-            np.testing.assert_array_equal(lines[name].get_xdata(), found.time)
+            expected = factor * calibration[f"{kind}_{channel}"]
+            np.testing.assert_array_equal(lines[name].get_xdata(), calibration.time)
             np.testing.assert_allclose(lines[name].get_ydata(), expected, rtol=1e-14)
     friction = {str(line.get_label()): line.get_ydata() for line in figure.axes[4].lines}
-    np.testing.assert_array_equal(friction["by statics"], found.free_body_friction)
-    np.testing.assert_array_equal(friction["μ(t) by Eq. 1"], found.friction_coefficient)
-    low, high = found.yield_acceleration_interval.values
-    text = f"Üy = {found.yield_acceleration.item():.4g} m/s² ({low:.3g} to {high:.3g}), λ = "
+    np.testing.assert_array_equal(friction["by statics"], calibration.free_body_friction)
+    np.testing.assert_array_equal(friction["μ(t) by Eq. 1"], calibration.friction_coefficient)
+    low, high = calibration.yield_acceleration_interval.values
+    text = f"Üy = {calibration.yield_acceleration.item():.4g} m/s² ({low:.3g} to {high:.3g}), λ = "
     assert text in figure.get_supxlabel()
 
 
@@ -110,13 +112,13 @@ def test_two_tests_are_calibrated_together(capsys: pytest.CaptureFixture[str]) -
     Path("short.csv").write_text("".join(Path(TEST).read_text().splitlines(keepends=True)[2::4]))
     assert cli.main(["calibrate", "short.csv", "short.csv", *BLOCK, "-o", "both.nc"]) == 0
     assert capsys.readouterr().out.count("cycle  starts, s") == 2
-    with xr.open_dataset("both.nc") as found:
-        assert found.sizes["test"] == 2
-        assert found.misfit_relative_velocity.dims == ("test",)
-        figure = found.load().slipsweep.chart()
+    with xr.open_dataset("both.nc") as calibration:
+        assert calibration.sizes["test"] == 2
+        assert calibration.misfit_relative_velocity.dims == ("test",)
+        figure = calibration.load().slipsweep.chart()
     titles = [axes.get_title(loc="left") for axes in figure.axes]
     for number in range(2):  # a column for each test
-        test = found.isel(test=number)
+        test = calibration.isel(test=number)
         misfit = test.misfit_relative_velocity.item()
         share = test.relative_misfit_relative_velocity.item()
         assert titles[4 + number] == f"misfit {misfit:.2g} m/s ({share:.1%})"
@@ -153,4 +155,4 @@ def test_the_example_is_what_its_script_makes() -> None:
     made = runpy.run_path(str(ROOT / "sweeps" / "data" / "shaking_test.py"))["text"]().splitlines()
     kept = Path(TEST).read_text().splitlines()
     assert len(made) == len(kept)
-    assert sum(one != other for one, other in zip(made, kept, strict=True)) < 10
+    assert sum(line != other for line, other in zip(made, kept, strict=True)) < 10

@@ -1,4 +1,4 @@
-"""The command line: exit status, messages, files; as a process of its own where that is what counts."""
+"""The command line: exit status, messages, files; as a process where that counts."""
 
 import contextlib
 import csv
@@ -67,7 +67,7 @@ def names(folder: Path) -> set[str]:
 # ------------------------------------------------------------------------------------- run
 
 
-def test_run_paper(tmp_path: Path) -> None:
+def test_a_run_of_the_papers_cases_gives_table_1(tmp_path: Path) -> None:
     done = command(tmp_path, "run", SWEEPS / "paper.toml")
     assert done.returncode == 0
     assert done.stderr == ""  # no progress bar but on a terminal
@@ -84,16 +84,16 @@ def test_run_paper(tmp_path: Path) -> None:
 def test_run_repeats_a_result(small: Path) -> None:
     assert command(small, "run", "small.toml", "-o", "a.nc", "--solver", "step").returncode == 0
     assert command(small, "run", "a.nc", "-o", "b.nc", "--quiet").stdout == ""
-    with netCDF4.Dataset(small / "a.nc") as one, netCDF4.Dataset(small / "b.nc") as other:
+    with netCDF4.Dataset(small / "a.nc") as first, netCDF4.Dataset(small / "b.nc") as other:
         assert other.sweep == SMALL
         assert other.solver == "step"
-        assert list(one.variables) == list(other.variables)
-        for name in one.variables:
-            np.testing.assert_array_equal(one[name][:].filled(), other[name][:].filled())
+        assert list(first.variables) == list(other.variables)
+        for name in first.variables:
+            np.testing.assert_array_equal(first[name][:].filled(), other[name][:].filled())
         assert other.history.endswith("slipsweep run a.nc -o b.nc --quiet")
 
 
-def test_the_name_of_the_output(small: Path) -> None:
+def test_an_output_is_named_by_option_by_sweep_file_or_after_it(small: Path) -> None:
     (small / "other.toml").write_text(f'{SMALL}[output]\npath = "mine.nc"')
     for arguments, name in (
         (("small.toml",), "small.nc"),
@@ -264,7 +264,8 @@ def missing(uid):
     raise KeyError(uid)
 pwd.getpwuid = missing
 from slipsweep.cli import main
-sys.exit(main(["run", "small.toml"]) or main(["chart", "small.nc", "-k", "contours", "-o", "a.png"]))
+chart = ["chart", "small.nc", "-k", "contours", "-o", "a.png"]
+sys.exit(main(["run", "small.toml"]) or main(chart))
 """
 
 
@@ -313,30 +314,53 @@ def test_info_prints_axes_variables_and_shares(small: Path) -> None:
     assert "  mu_s.values = [0.3, 0.5]" in lines
 
 
-def test_simulate_writes_every_kind(tmp_path: Path) -> None:
-    outputs = [f"a{suffix}" for suffix in (".nc", ".csv", ".png", ".svg", ".pdf")]
-    options = [part for output in outputs for part in ("-o", output)]
-    done = command(tmp_path, *SIMULATE, "--cycles", "2", "--points", "64", *options)
+OUTPUTS = [f"a{suffix}" for suffix in (".nc", ".csv", ".png", ".svg", ".pdf")]
+
+
+@pytest.fixture(scope="module")
+def simulated(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A folder with a time history in every kind of file, and what `simulate` printed."""
+    folder = tmp_path_factory.mktemp("simulated")
+    options = [part for output in OUTPUTS for part in ("-o", output)]
+    done = command(folder, *SIMULATE, "--cycles", "2", "--points", "64", *options)
     assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("permanent displacement  ")
-    assert "sliding mode            stick_slip\n" in done.stdout
-    assert done.stdout.endswith("".join(f"{output}\n" for output in outputs))
-    assert names(tmp_path) == set(outputs)
-    with xr.open_dataset(tmp_path / "a.nc") as dataset:
-        assert float(dataset["time"][1]) == pytest.approx(1 / (1.8 * 64))
-        displacement = dataset["relative_displacement"]
-        assert displacement.dims == dataset["time"].dims == ("instant",)
-        with (tmp_path / "a.csv").open(newline="") as file:
-            header, *rows = csv.reader(file)
-        column = header.index("relative_displacement (m)")
-        assert header[0] == "time (s)"
-        np.testing.assert_array_equal([float(row[column]) for row in rows], displacement)
-        assert float(displacement[-1]) == pytest.approx(
-            float(dataset["permanent_displacement"]), rel=1e-9
-        )
-    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
-    assert (tmp_path / "a.pdf").read_bytes().startswith(b"%PDF")
-    assert "<svg" in (tmp_path / "a.svg").read_text()
+    return folder, done.stdout
+
+
+def test_simulate_prints_results_and_outputs(simulated: tuple[Path, str]) -> None:
+    folder, text = simulated
+    assert text.startswith("permanent displacement  ")
+    assert "sliding mode            stick_slip\n" in text
+    assert text.endswith("".join(f"{output}\n" for output in OUTPUTS))
+    assert names(folder) == set(OUTPUTS)
+
+
+def test_simulate_writes_the_history_to_netcdf(simulated: tuple[Path, str]) -> None:
+    with xr.open_dataset(simulated[0] / "a.nc") as history:
+        assert float(history["time"][1]) == pytest.approx(1 / (1.8 * 64))
+        displacement = history["relative_displacement"]
+        assert displacement.dims == history["time"].dims == ("instant",)
+        last = float(history["permanent_displacement"])
+        assert float(displacement[-1]) == pytest.approx(last, rel=1e-9)
+
+
+def test_simulate_writes_the_same_history_as_a_table(simulated: tuple[Path, str]) -> None:
+    with (simulated[0] / "a.csv").open(newline="") as file:
+        header, *rows = csv.reader(file)
+    assert header[0] == "time (s)"
+    column = header.index("relative_displacement (m)")
+    with xr.open_dataset(simulated[0] / "a.nc") as history:
+        displacement = history["relative_displacement"].values
+    np.testing.assert_array_equal([float(row[column]) for row in rows], displacement)
+
+
+@pytest.mark.parametrize(("suffix", "start"), [("png", b"\x89PNG"), ("pdf", b"%PDF")])
+def test_simulate_draws_images(simulated: tuple[Path, str], suffix: str, start: bytes) -> None:
+    assert (simulated[0] / f"a.{suffix}").read_bytes().startswith(start)
+
+
+def test_simulate_draws_vector_graphics(simulated: tuple[Path, str]) -> None:
+    assert "<svg" in (simulated[0] / "a.svg").read_text()
 
 
 @pytest.mark.usefixtures("without_layout")
@@ -380,7 +404,7 @@ def test_a_report_has_a_title_page_and_a_chart_a_page(small: Path) -> None:
         (["run", "small.toml"], {"matplotlib"}),
     ],
 )
-def test_what_a_command_does_not_need_is_not_loaded(
+def test_a_command_loads_only_packages_that_it_needs(
     small: Path, arguments: list[str], heavy: set[str]
 ) -> None:
     code = f"import sys; from slipsweep.cli import main; main({arguments}); print(*sys.modules)"

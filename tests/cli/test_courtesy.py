@@ -1,21 +1,24 @@
-"""Units as people type them, names as commands can write them, and a reason where there is no number."""
+"""Units as people type them, names that commands can write, and a reason for each missing value."""
 
 import importlib
 import math
-import re
 import sys
 from pathlib import Path
 
-import pandas as pd
 import pytest
 
 from slipsweep._version import __version__
-from slipsweep.files import running
 from slipsweep.files.opening import read_result
 from tests.support.commands import run_command
 
 BLOCK = ("simulate", "--theta", "5", "--mu-s", "0.38", "--frequency", "2")
-SWEEP = "[axes]\ntheta.values = [5]\nmu_s.values = [0.4]\namplitude.values = [4]\nfrequency.values = [2]\n"
+SWEEP = """
+[axes]
+theta.values = [5]
+mu_s.values = [0.4]
+amplitude.values = [4]
+frequency.values = [2]
+"""
 
 
 def told(*arguments: object, status: int = 0) -> str:
@@ -53,7 +56,7 @@ def told(*arguments: object, status: int = 0) -> str:
 def test_simulate_takes_units_and_says_what_it_took(
     typed: tuple[str, ...], same: tuple[str, ...], echo: str
 ) -> None:
-    first, other = (told(*BLOCK, *given) for given in (typed, same))
+    first, other = (told(*BLOCK, *options) for options in (typed, same))
     assert first == other
     assert "taken as                theta 5 degree, mu_s 0.38, " in first
     assert echo in first
@@ -62,15 +65,15 @@ def test_simulate_takes_units_and_says_what_it_took(
 
 def test_simulate_says_what_it_took_of_a_record(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("time (s),acceleration (g)\n0,0\n1,0.5\n2,-0.5\n3,0\n")
-    given = ("simulate", "--theta", "5", "--phi", "21", "--record", tmp_path / "a.csv")
+    command_line = ("simulate", "--theta", "5", "--phi", "21", "--record", tmp_path / "a.csv")
     taken = "taken as                theta 5 degree, mu_s 0.383864, phi 21 degree, scale {}, "
-    assert taken.format("1") + "time scale 1, polarity 1\n" in told(*given)
+    assert taken.format("1") + "time scale 1, polarity 1\n" in told(*command_line)
     typed = ("--scale", "2", "--polarity", "-1", "--time-scale", "0.5")
-    assert taken.format("2") + "time scale 0.5, polarity -1\n" in told(*given, *typed)
+    assert taken.format("2") + "time scale 0.5, polarity -1\n" in told(*command_line, *typed)
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("options", "message"),
     [
         (
             ("--amplitude", "high"),
@@ -83,12 +86,12 @@ def test_simulate_says_what_it_took_of_a_record(tmp_path: Path) -> None:
         (("--amplitude", "-0.1g"), "amplitude = -0.981"),
     ],
 )
-def test_a_unit_that_does_not_fit_is_refused(given: tuple[str, ...], message: str) -> None:
-    assert message in told(*BLOCK, *given, status=2)
+def test_a_unit_that_does_not_fit_is_refused(options: tuple[str, ...], message: str) -> None:
+    assert message in told(*BLOCK, *options, status=2)
 
 
 @pytest.mark.parametrize(
-    ("given", "flag"),
+    ("options", "flag"),
     [
         (
             ("--amplitude", "4", "--yield-acceleration", "-0.1g"),
@@ -99,116 +102,12 @@ def test_a_unit_that_does_not_fit_is_refused(given: tuple[str, ...], message: st
     ],
 )
 def test_simulate_without_a_value_says_why_and_fails(
-    tmp_path: Path, given: tuple[str, ...], flag: str
+    tmp_path: Path, options: tuple[str, ...], flag: str
 ) -> None:
-    message = told(*BLOCK, *given, "-o", tmp_path / "a.csv", status=1)
+    message = told(*BLOCK, *options, "-o", tmp_path / "a.csv", status=1)
     assert f"the model gives no value: {flag}" in message
     assert message.count("\n") == 1
     assert not (tmp_path / "a.csv").exists()
-
-
-def test_messages_give_reasons_and_remedies(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """An angle taken for a coefficient, values that a record lacks, an axis that is not there, and unsound places."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "a.toml").write_text(SWEEP.replace("0.4", "22"))
-    assert "no cell has a value: 1 - tan(theta) (mu_s - tan(theta)) <= 0" in (
-        out := told("run", "a.toml")
-    )
-    assert "did you mean phi = 22?" in out
-    (tmp_path / "a.csv").write_text("0,1\n1,-999\n2,0\n")
-    message = told("simulate", "--record", "a.csv", "--units", "m/s2", *BLOCK[1:5], status=2)
-    assert "--gaps linear interpolates" in message
-    (tmp_path / "c.toml").write_text(SWEEP.replace("[4]", "[0.1]").replace("[5]", "[0, 5]"))
-    smallest = 9.81 * math.tan(math.atan(0.4) - math.radians(5))
-    assert f"smallest yield acceleration {smallest:.6g} m/s2" in told("run", "c.toml")
-    axes = (
-        SWEEP.replace("mu_s", "phi").replace("0.4", "20, 22").replace("[4]", "[2, 4, 6, 8, 10, 12]")
-    )
-    (tmp_path / "b.toml").write_text(axes)
-    assert "unsound: the displacement falls with A in " in told("run", "b.toml")
-    told("chart", "b.nc", "-k", "curve", "--at", "mu_s=0.404", "-o", "a.png")
-    message = told("chart", "b.nc", "--at", "frequncy=2", "-o", "b.png", status=2)
-    assert 'frequncy = 2: no such axis; did you mean "frequency"?' in message
-
-
-def test_run_and_info_say_what_motions_lack(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Vertical components, clipping, zeros, large factors; also when the result is repeated."""
-    monkeypatch.chdir(tmp_path)
-    Path("m").mkdir()
-    shaking = [math.sin(0.3 * at + 0.2) for at in range(40)]
-    motions = {
-        "weak": [0.1 * value for value in shaking],
-        "clipped": [min(value, 0.7) for value in shaking],
-        "half": [*shaking[:20], *[0.0] * 20],
-        "a-UP": shaking,
-    }
-    for name, values in motions.items():
-        Path(f"m/{name}.txt").write_text("dt = 0.02, in m/s2\n" + "\n".join(map(str, values)))
-    sweep = (
-        'model.friction = "newmark"\nexcitation.records = "m"\naxes.theta.values = [5]\n'
-        "axes.mu_s.values = [0.2]\naxes.amplitude.values = [0.3, 2]\n"
-    )
-    Path("a.toml").write_text(sweep)
-    for out in (told("run", "a.toml"), told("run", "a.nc", "-o", "b.nc")):
-        assert re.search(r"clipped\.txt: .*; caution: flat at its largest value 0\.7 m/s2 \(", out)
-        assert "half.txt: " in out
-        assert "; caution: 50% of its samples are 0" in out
-        assert "left out, vertical components: a-UP.txt (UP); vertical = 'accept' takes them" in out
-        assert "\nscale factors above 4, up to 20: weak; such motions have the frequencies" in out
-    for file in ("a.nc", "b.nc"):
-        out = told("info", file)
-        assert re.search(r"^caution: .*half\.txt: 50% of its samples are 0$", out, re.MULTILINE)
-        assert "left_out_vertical: a-UP.txt (UP)" in out
-    Path("b.toml").write_text(sweep.replace("[0.3, 2]", "[0.3]"))
-    assert "scale factors" not in told("run", "b.toml", "-o", "low.nc")
-    one = sweep.replace('records = "m"', 'record = "m/weak.txt"')
-    Path("c.toml").write_text(one.replace("amplitude", "scale").replace("[0.3, 2]", "[1, 5]"))
-    assert "scale factors above 4, up to 5; such motions" in told("run", "c.toml")
-    Path("d.toml").write_text(f'{one}excitation.vertical = "accept"\n')
-    message = told("run", "d.toml", status=2)
-    assert "excitation.vertical: only beside excitation.records" in message
-    Path("e.toml").write_text(f'{sweep}excitation.vertical = "accept"\n')
-    assert "; caution: vertical component (UP)" in told("run", "e.toml")
-    assert (
-        "record                  m/half.txt: "
-        in (told("simulate", "--record", "m/half.txt", *BLOCK[1:5]).splitlines()[0])
-    )
-
-
-def test_what_no_design_must_rest_on_goes_with_the_result(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    axes = SWEEP.replace("[4]", "[2, 4, 6, 8, 10, 12]").replace("[2]", "[1, 2]")
-    (tmp_path / "a.toml").write_text(axes)
-    assert told("run", "a.toml", "-q", "-o", "a.nc") == ""
-    whole = read_result("a.nc")
-    falls, continuous = whole.attrs["unsound"].splitlines()
-    assert falls.startswith("the displacement falls with A in ")
-    assert continuous.endswith(" slide continuously with estimated friction: not for design")
-    # in chunks, compressed, and in a store
-    monkeypatch.setattr(running, "CHUNK_CELLS", 6)
-    (tmp_path / "c.toml").write_text(f"{axes}[output]\ncompression = 1\n")
-    for sweep, output in (("a.toml", "b.nc"), ("c.toml", "c.nc"), ("a.toml", "b.zarr")):
-        told("run", sweep, "-q", "-o", output)
-        assert read_result(output).attrs["unsound"] == whole.attrs["unsound"]
-    lines = f"unsound: {falls}\nunsound: {continuous}\n"
-    assert lines in told("info", "a.nc")
-    assert lines in told("run", "a.toml", "-o", "again.nc")
-    assert lines in told("run", "a.toml", "-o", "again.nc", "--resume")
-    told("export", "a.nc", "-o", "a.xlsx")
-    rows = pd.read_excel("a.xlsx", sheet_name="about", header=None).ffill()
-    assert rows[rows[0] == "unsound"][1].tolist() == [falls, continuous]
-    told("explore", "a.nc")
-    assert f"Unsound: {continuous}." in Path("a.html").read_text("utf-8")
-    # a sound one says nothing
-    (tmp_path / "d.toml").write_text(f'{axes}[model]\nfriction = "newmark"\n')
-    assert "unsound" not in told("run", "d.toml", "-o", "d.nc")
-    assert "unsound" not in read_result("d.nc").attrs
 
 
 def test_a_history_not_for_design_says_so_in_its_file(tmp_path: Path) -> None:
@@ -248,7 +147,7 @@ def test_limit_says_what_it_took(tmp_path: Path) -> None:
     assert bare == told("limit", sweep, "-d", "50mm", "--maximum-amplitude", "2g")
 
 
-def test_version() -> None:
+def test_the_version_is_printed() -> None:
     assert told("--version") == f"slipsweep {__version__}\n"
 
 
@@ -262,3 +161,49 @@ def test_versions_are_those_of_the_modules_that_are_loaded() -> None:
 def test_versions_name_what_cannot_be_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "netCDF4", None)
     assert "netCDF library: import of netCDF4 halted" in told("--versions")
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder, in which commands run."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_an_angle_as_a_coefficient_is_asked_about(here: Path) -> None:
+    (here / "a.toml").write_text(SWEEP.replace("0.4", "22"))
+    output = told("run", "a.toml")
+    assert "no cell has a value: 1 - tan(theta) (mu_s - tan(theta)) <= 0" in output
+    assert "did you mean phi = 22?" in output
+
+
+def test_values_that_a_record_lacks_can_be_interpolated(here: Path) -> None:
+    (here / "a.csv").write_text("0,1\n1,-999\n2,0\n")
+    message = told("simulate", "--record", "a.csv", "--units", "m/s2", *BLOCK[1:5], status=2)
+    assert "--gaps linear interpolates" in message
+
+
+def test_the_smallest_yield_acceleration_is_printed_if_no_cell_slides(here: Path) -> None:
+    (here / "a.toml").write_text(SWEEP.replace("[4]", "[0.1]").replace("[5]", "[0, 5]"))
+    smallest = 9.81 * math.tan(math.atan(0.4) - math.radians(5))
+    assert f"smallest yield acceleration {smallest:.6g} m/s2" in told("run", "a.toml")
+
+
+@pytest.fixture
+def over_angles(here: Path) -> None:
+    """A result over two friction angles and some amplitudes."""
+    text = SWEEP.replace("mu_s", "phi").replace("0.4", "20, 22")
+    (here / "b.toml").write_text(text.replace("[4]", "[2, 4, 6, 8, 10, 12]"))
+    told("run", "b.toml")
+
+
+@pytest.mark.usefixtures("over_angles")
+def test_a_chart_over_friction_angles_is_cut_at_a_coefficient(here: Path) -> None:
+    told("chart", "b.nc", "-k", "curve", "--at", "mu_s=0.404", "-o", "a.png")
+    assert (here / "a.png").exists()
+
+
+@pytest.mark.usefixtures("over_angles")
+def test_a_misspelt_axis_of_a_chart_is_asked_about() -> None:
+    message = told("chart", "b.nc", "--at", "frequncy=2", "-o", "b.png", status=2)
+    assert 'frequncy = 2: no such axis; did you mean "frequency"?' in message

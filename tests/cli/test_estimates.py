@@ -17,7 +17,7 @@ BLOCK: dict[str, Any] = {"theta": 5.0, "mu_s": 0.4, "amplitude": 4.0, "frequency
 
 
 @pytest.mark.parametrize(
-    ("given", "words"),
+    ("inputs", "words"),
     [
         ({}, "Üy by Coulomb, λ by Eq. 6, Δμ by Eqs. 10–11: estimated"),
         ({"yield_acceleration": [0.5, 1.0]}, "Üy given; λ by Eq. 6, Δμ by Eqs. 10–11: estimated"),
@@ -34,21 +34,21 @@ BLOCK: dict[str, Any] = {"theta": 5.0, "mu_s": 0.4, "amplitude": 4.0, "frequency
         ({"model": "newmark", "yield_acceleration": 0.59, "decay_rate": 2.7}, "Üy given"),
     ],
 )
-def test_every_result_says_what_is_estimated(given: dict[str, Any], words: str) -> None:
-    attrs = slipsweep.sweep(**BLOCK, **given).attrs
+def test_every_result_says_what_is_estimated(inputs: dict[str, Any], words: str) -> None:
+    attrs = slipsweep.sweep(**BLOCK, **inputs).attrs
     assert attrs["friction_inputs"] == words
     assert style.model_text(attrs).startswith(f"{words}\n")
-    if "yield_acceleration" not in given or np.ndim(given["yield_acceleration"]) == 0:
-        assert slipsweep.simulate(**BLOCK, **given).attrs["friction_inputs"] == words
+    if "yield_acceleration" not in inputs or np.ndim(inputs["yield_acceleration"]) == 0:
+        assert slipsweep.simulate(**BLOCK, **inputs).attrs["friction_inputs"] == words
     limit = {name: value for name, value in BLOCK.items() if name != "amplitude"}
-    assert slipsweep.limit_amplitude(0.1, **limit, **given).attrs["friction_inputs"] == words
-    if given.get("model") != "newmark":
-        record = slipsweep.sweep(5.0, 0.4, excitation=RECORD, **given)
+    assert slipsweep.limit_amplitude(0.1, **limit, **inputs).attrs["friction_inputs"] == words
+    if inputs.get("model") != "newmark":
+        record = slipsweep.sweep(5.0, 0.4, excitation=RECORD, **inputs)
         assert record.attrs["friction_inputs"] == words
 
 
 @pytest.mark.parametrize(
-    ("given", "drawn", "words"),
+    ("names", "drawn", "words"),
     [
         ((), {"mu_s": "absolute"}, "Üy by Coulomb, λ by Eq. 6, Δμ by Eqs. 10–11: estimated"),
         ((), {"decay_rate": "absolute"}, "λ drawn; Üy by Coulomb, Δμ by Eqs. 10–11: estimated"),
@@ -69,18 +69,18 @@ def test_every_result_says_what_is_estimated(given: dict[str, Any], words: str) 
         ),
     ],
 )
-def test_what_is_drawn_is_told_apart(
-    given: tuple[str, ...], drawn: dict[str, str], words: str
+def test_drawn_parameters_are_named_as_drawn(
+    names: tuple[str, ...], drawn: dict[str, str], words: str
 ) -> None:
-    assert friction_inputs("mendez", given, drawn) == words
+    assert friction_inputs("mendez", names, drawn) == words
     uncertain = {
         name: {"distribution": "uniform", "loc": 0.9, "scale": 0.2, "kind": kind}
         for name, kind in drawn.items()
     }
     block = {name: value for name, value in BLOCK.items() if drawn.get(name) != "absolute"}
-    about: dict[str, Any] = dict.fromkeys(given, 0.5)
-    found = slipsweep.sample(**block, **about, uncertain=uncertain, samples=4)
-    assert found.attrs["friction_inputs"] == words
+    about: dict[str, Any] = dict.fromkeys(names, 0.5)
+    samples = slipsweep.sample(**block, **about, uncertain=uncertain, samples=4)
+    assert samples.attrs["friction_inputs"] == words
 
 
 def test_summaries_files_and_info_say_it(tmp_path: Path) -> None:

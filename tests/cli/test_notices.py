@@ -24,7 +24,7 @@ def printed(folder: Path, *arguments: object) -> str:
 
 
 @pytest.mark.parametrize(
-    ("amplitude", "given", "warned"),
+    ("amplitude", "options", "warned"),
     [
         ("0.9g", (), True),  # continuous, with λ and Δμ estimated
         ("0.3g", (), False),  # stick-slip
@@ -33,10 +33,10 @@ def printed(folder: Path, *arguments: object) -> str:
     ],
 )
 def test_continuous_sliding_with_estimated_friction_is_not_for_design(
-    tmp_path: Path, amplitude: str, given: tuple[str, ...], warned: bool
+    tmp_path: Path, amplitude: str, options: tuple[str, ...], warned: bool
 ) -> None:
     block = ("--theta", "5", "--mu-s", "0.38", "--amplitude", amplitude, "--frequency", "1.8")
-    text = printed(tmp_path, "simulate", *block, *given)
+    text = printed(tmp_path, "simulate", *block, *options)
     line = "unsound                 continuous sliding with estimated friction: not for design\n"
     assert (line in text) == warned
     assert ("sliding mode            continuous\n" in text) == (amplitude == "0.9g")
@@ -74,19 +74,19 @@ def test_a_solver_that_is_typed_keeps_the_options_of_the_sweep_file(
 def test_amplitudes_that_may_be_meant_in_g_are_asked_about(
     tmp_path: Path, amplitudes: list[float], hint: bool
 ) -> None:
-    """Where no cell slides: the largest amplitude and the smallest yield acceleration, in both units."""
+    """If no cell slides: the largest amplitude and the smallest Üy, in both units."""
     text = SWEEP.replace("theta.values = [5]", "theta.values = [0]").replace(
         "[2, 4]", str(amplitudes)
     )
     (tmp_path / "a.toml").write_text(text.replace("[0.3, 0.4]", "[0.5, 0.6]"))
-    found = printed(tmp_path, "run", "a.toml")
+    output = printed(tmp_path, "run", "a.toml")
     largest = amplitudes[-1]
     line = (
         f"no cell slides: largest amplitude {largest:.6g} m/s2 ({largest / 9.81:.4g} g), "
         "smallest yield acceleration 4.905 m/s2 (0.5 g)"
     )
     question = '; did you mean units = "g"?' if hint else ""
-    assert f"{line}{question}\n" in found
+    assert f"{line}{question}\n" in output
 
 
 def test_an_axis_is_cut_once(tmp_path: Path) -> None:

@@ -17,16 +17,16 @@ CURVE = "PGA (g), annual rate\n0.05, 0.02\n0.2, 0.002\n0.8, 0.00006\n1.5, 0.0000
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    found = tmp_path_factory.mktemp("published")
+    root = tmp_path_factory.mktemp("published")
     result = slipsweep.sweep(
         yield_coefficient=[0.04, 0.1],
         amplitude=np.array([0.2, 0.4]) * 9.81,
         excitation=slipsweep.read_suite(str(SUITE / "*_H1.AT2")),
         model="newmark",
     )
-    result.to_netcdf(found / "a.nc")
-    (found / "hazard.csv").write_text(CURVE)
-    return found
+    result.to_netcdf(root / "a.nc")
+    (root / "hazard.csv").write_text(CURVE)
+    return root
 
 
 def test_info_prints_equations_beside_the_suite(folder: Path) -> None:
@@ -36,7 +36,9 @@ def test_info_prints_equations_beside_the_suite(folder: Path) -> None:
     assert (done.returncode, done.stderr) == (0, "")
     lines = done.stdout.splitlines()
     start = lines.index("published equations beside:")
-    title, suite, jibson = lines[start + 1], lines[start + 4], lines[start + 5]
+    title = lines[start + 1]
+    suite = lines[start + 4]
+    jibson = lines[start + 5]
     assert title.split() == [
         *("PGA", "(g)", "displacement", "of", "16", "%", "(mm)", "median", "(mm)", "84", "%"),
         *("(mm)", "zero", "P(u", ">", "50", "mm)", "range"),
@@ -112,7 +114,9 @@ def test_hazard_takes_equations_in_place_of_the_suite(folder: Path) -> None:
         ),
     ],
 )
-def test_what_is_refused(folder: Path, arguments: tuple[str, ...], message: str) -> None:
+def test_options_that_do_not_fit_are_refused(
+    folder: Path, arguments: tuple[str, ...], message: str
+) -> None:
     done = command(folder, *arguments)
     assert (done.returncode, done.stdout) == (2, "")
     assert message in done.stderr

@@ -69,7 +69,15 @@ def test_file_and_table_have_the_quantiles_of_the_suite(folder: Path, expected: 
         assert "32 required strengths (2 amplitude x 2 displacement x 2 polarity x 4 motion)" in (
             done.stdout
         )
-        rows = [line.split() for line in done.stdout.splitlines() if line.startswith("amplitude =")]
+        lines = done.stdout.splitlines()
+        headings = [" ".join(line.split()) for line in lines if line.endswith("always  never")]
+        assert headings == ["16 % median 84 % always never"]
+        rows = [line.split() for line in lines if line.startswith("amplitude =")]
+        assert [" ".join(words[:-5]) for words in rows] == [
+            f"amplitude = {pga}, displacement = {length}"
+            for pga in (0.2, 0.4)
+            for length in (0.02, 0.05)
+        ]
         quantiles = expected.required_yield_coefficient_quantile.values.reshape(4, 3)
         printed = np.array([[float(word) for word in words[-5:-2]] for words in rows])
         np.testing.assert_allclose(printed, quantiles, rtol=6e-4)
@@ -109,7 +117,7 @@ def test_uncertain_inputs_of_a_sweep_file(folder: Path) -> None:
     done = command(folder, "limit", "uncertain.toml", *options)
     assert (done.returncode, done.stderr) == (0, "")
     suite = slipsweep.read_suite("sweeps/data/suite/rock-*.AT2")
-    found = slipsweep.required_strength(
+    required = slipsweep.required_strength(
         0.05,
         [0.2 * G, 0.4 * G],
         excitation=suite,
@@ -123,7 +131,7 @@ def test_uncertain_inputs_of_a_sweep_file(folder: Path) -> None:
     )
     with slipsweep.open_result(folder / "samples.nc") as table:
         np.testing.assert_array_equal(
-            table.required_yield_coefficient_quantile, found.required_yield_coefficient_quantile
+            table.required_yield_coefficient_quantile, required.required_yield_coefficient_quantile
         )
         assert table.attrs["pooled"] == "2 polarity x 4 motion"
     assert "2 polarity x 4 motion x 64 samples" in done.stdout

@@ -47,12 +47,12 @@ def test_a_sweep_file_gives_what_python_gives(folder: Path) -> None:
         model=slipsweep.Newmark(strength="weakening"),
         excitation=slipsweep.Sine(cycles=3),
     )
-    with slipsweep.open_result(folder / "liner.nc") as found:
+    with slipsweep.open_result(folder / "liner.nc") as result:
         for name in ("permanent_displacement", "validity"):
-            values = expected[name].transpose(*found[name].dims).values
-            np.testing.assert_allclose(found[name].values, values, rtol=1e-12)
-        assert found.attrs["strength"] == "weakening"
-        flags = slipsweep.flags(found)
+            values = expected[name].transpose(*result[name].dims).values
+            np.testing.assert_allclose(result[name].values, values, rtol=1e-12)
+        assert result.attrs["strength"] == "weakening"
+        flags = slipsweep.flags(result)
         assert flags.may_not_stop.any()
         assert flags.not_at_rest.any()
 
@@ -73,8 +73,7 @@ def test_info_the_page_the_table_and_a_repeated_run_say_it(folder: Path) -> None
     assert (again.returncode, again.stderr) == (0, "")
 
 
-def test_charts_say_it() -> None:
-    """In words, on the chart itself."""
+def test_a_chart_names_the_changing_strength() -> None:
     result = slipsweep.sweep(
         5.0,
         phi=14.0,
@@ -85,8 +84,8 @@ def test_charts_say_it() -> None:
         model=slipsweep.Newmark(strength="weakening"),
     )
     figure = result.slipsweep.chart("families", at={"frequency": 1})
-    texts = " ".join(text.get_text() for text in [*figure.texts, figure._supxlabel] if text)
-    assert "friction falls with slip" in " ".join(texts.split())
+    texts = [*(text.get_text() for text in figure.texts), figure.get_supxlabel()]
+    assert "friction falls with slip" in " ".join(" ".join(texts).split())
 
 
 def test_one_case_from_the_command_line(folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""Tables and summaries that commands print: every column has the numbers of Python's functions, in its unit."""
+"""Tables and summaries that commands print have the numbers of Python's functions, in units."""
 
 import re
 from pathlib import Path
@@ -78,9 +78,9 @@ def numbers(words: list[str]) -> list[float]:
 
 def share(text: str, name: str) -> float:
     """The percentage behind a name at the beginning of a line."""
-    found = re.search(rf"^ *{name} +([\d.]+)%", text, re.MULTILINE)
-    assert found, name
-    return float(found[1]) / 100.0
+    match = re.search(rf"^ *{name} +([\d.]+)%", text, re.MULTILINE)
+    assert match, name
+    return float(match[1]) / 100.0
 
 
 # ---------------------------------------------------------------------------------- sweeps
@@ -114,12 +114,12 @@ def test_ratio_to_newmark_is_of_cells_in_which_both_slide(folder: Path) -> None:
     ratio = (data.permanent_displacement / data.newmark_displacement).values
     slides = np.isfinite(ratio) & (data.permanent_displacement.values != 0.0)
     ratio = np.maximum(ratio[slides & (data.newmark_displacement.values != 0.0)], 1e-7)
-    found = re.search(
+    match = re.search(
         r"over Newmark's, where both slide: median (\S+), 5 to 95 % (\S+) to (\S+)",
         (folder / "sweep.txt").read_text(),
     )
-    assert found
-    middle, low, high = map(float, found.groups())
+    assert match
+    middle, low, high = map(float, match.groups())
     expected = np.quantile(ratio, [0.5, 0.05, 0.95], method="inverted_cdf")
     np.testing.assert_allclose([middle, low, high], expected, rtol=6e-3)
 
@@ -149,8 +149,12 @@ def test_limits_are_summed_up_in_both_units(folder: Path) -> None:
         excitation=slipsweep.Sine(cycles=15),
         maximum_amplitude=2 * G,
     )
-    found = limits.limit_amplitude
-    values = {"smallest": found.min(), "median": found.median(), "largest": found.max()}
+    amplitudes = limits.limit_amplitude
+    values = {
+        "smallest": amplitudes.min(),
+        "median": amplitudes.median(),
+        "largest": amplitudes.max(),
+    }
     for name, value in values.items():
         amount = float(value)
         assert f"\n  {name:<24}{amount:.6g} m/s2 ({amount / G:.4g} g)\n" in text
@@ -163,15 +167,15 @@ def test_limits_are_summed_up_in_both_units(folder: Path) -> None:
 
 
 def test_simulate_prints_the_results_of_the_case(tmp_path: Path) -> None:
-    given = ("--theta", "5", "--mu-s", "0.38", "--amplitude", "0.9g", "--frequency", "1.8")
-    text = printed(tmp_path, "simulate", *given)
-    found = slipsweep.sweep(5.0, 0.38, 0.9 * G, 1.8)
-    assert f"permanent displacement  {found.permanent_displacement.item():.6g} m\n" in text
-    assert f"peak relative velocity  {found.peak_relative_velocity.item():.6g} m/s\n" in text
+    options = ("--theta", "5", "--mu-s", "0.38", "--amplitude", "0.9g", "--frequency", "1.8")
+    text = printed(tmp_path, "simulate", *options)
+    result = slipsweep.sweep(5.0, 0.38, 0.9 * G, 1.8)
+    assert f"permanent displacement  {result.permanent_displacement.item():.6g} m\n" in text
+    assert f"peak relative velocity  {result.peak_relative_velocity.item():.6g} m/s\n" in text
     assert "sliding mode            continuous\n" in text
     taken = "theta 5 degree, mu_s 0.38, amplitude 8.829 m/s2 (0.9 g), frequency 1.8 Hz"
     assert f"taken as                {taken}\n" in text
-    for flag in Validity(found.validity.item()):
+    for flag in Validity(result.validity.item()):
         assert f"{flag.kind:<24}{(flag.name or '').lower()}: {flag.text}\n" in text
 
 
@@ -194,16 +198,16 @@ def test_info_has_every_measure_of_every_motion(folder: Path) -> None:
 
 
 def test_statistics_of_a_suite_have_a_line_for_each_grid_point(folder: Path) -> None:
-    """Median, 16 and 84 % in mm, the share of zeros, and P(u > d) of the displacements asked for."""
+    """Median, 16 and 84 % in mm, the share of zeros, and P(u > d) of each displacement."""
     text = printed(folder, "info", "suite.nc", "-d", "1mm", "-d", "2cm")
     heading, rows = table(text, "PGA (g)   ky", 8)
     titles = "PGA (g) ky 16 % median 84 % zero P(u > 1 mm) P(u > 20 mm)"
     assert " ".join(heading.split()) == titles
     data = slipsweep.open_result(folder / "suite.nc").load()
-    found = slipsweep.suite_statistics(data, thresholds=[0.001, 0.02])
+    statistics = slipsweep.suite_statistics(data, thresholds=[0.001, 0.02])
     points = [(a, ky) for a in data.amplitude.values for ky in data.yield_coefficient.values]
     for (amplitude, ky), words in zip(points, rows, strict=True):
-        at = found.sel(yield_coefficient=ky, amplitude=amplitude)
+        at = statistics.sel(yield_coefficient=ky, amplitude=amplitude)
         middle = 1000.0 * at.displacement_quantile.values
         exceeding = 100.0 * at.exceedance_probability.values
         zeros = 100.0 * at.zero_probability.item()
@@ -217,25 +221,38 @@ def test_statistics_of_a_suite_have_a_line_for_each_grid_point(folder: Path) -> 
 def test_hazard_prints_rates_periods_steps_and_parts(folder: Path) -> None:
     text = printed(folder, "hazard", "suite.nc", "--curve", "hazard.csv", "-d", "1mm", "-d", "10mm")
     data = slipsweep.open_result(folder / "suite.nc").load()
-    found = slipsweep.displacement_hazard(data, folder / "hazard.csv", [0.001, 0.01])
+    hazard = slipsweep.displacement_hazard(data, folder / "hazard.csv", [0.001, 0.01])
     low, high = (float(end) / G for end in (0.2, 6.0))
     heading, rows = table(text, "annual rate  period (years)", 4, skipped=1)
     titles = ["annual rate", "period (years)", "steps, from", "to"]
     titles += [f"above {high:.3g} g", f"below {low:.3g} g"]
     assert re.split(r"\s{2,}", heading.strip())[-6:] == titles
-    rate = found.annual_rate.values.ravel()
+    rate = hazard.annual_rate.values.ravel()
     expected = np.column_stack(
         [
             rate,
             1.0 / rate,
-            *(found[name].values.ravel() / rate for name in ("lower_rate", "upper_rate")),
-            *(found[name].values.ravel() / rate for name in ("held_rate", "omitted_rate")),
+            *(hazard[name].values.ravel() / rate for name in ("lower_rate", "upper_rate")),
+            *(hazard[name].values.ravel() / rate for name in ("held_rate", "omitted_rate")),
         ]
     )
     assert (rate > 0.0).all()
     np.testing.assert_allclose([numbers(words[-6:]) for words in rows], expected, rtol=6e-4)
     assert "P(u > d | PGA): share over motion and polarity\n" in text
     assert "amplitudes of the result 0.02039 to 0.6116 g, hazard curve 0.01 to 1 g\n" in text
+
+
+@pytest.mark.parametrize(("displacement", "is_held"), [("0.01mm", False), ("10mm", True)])
+def test_hazard_says_where_a_twentieth_of_a_rate_is_held_above_the_axis(
+    folder: Path, displacement: str, is_held: bool
+) -> None:
+    text = printed(folder, "hazard", "suite.nc", "--curve", "hazard.csv", "-d", displacement)
+    data = slipsweep.open_result(folder / "suite.nc").load()
+    found = slipsweep.displacement_hazard(data, folder / "hazard.csv", displacement)
+    assert (found.held_rate > 0.05 * found.annual_rate).any() == is_held
+    assert ("\nabove 0.6116 g P(u > d) is taken as it is there: to compute it, " in text) == is_held
+    # nothing slides at the lower end of the axis
+    assert "nothing is counted" not in text
 
 
 def test_limits_of_a_suite_have_quantiles_counts_and_every_motion(folder: Path) -> None:
@@ -246,12 +263,15 @@ def test_limits_of_a_suite_have_quantiles_counts_and_every_motion(folder: Path) 
     each = limits.limit_amplitude.transpose("yield_coefficient", "motion", "polarity")
     values = each.values.reshape(2, -1) / G
     _, rows = table(text, "16 %  median", 2)
-    for words, own in zip(rows, values, strict=True):
-        reached = np.nan_to_num(own, nan=1e9)  # above all others
+    for words, limits_of_motion in zip(rows, values, strict=True):
+        reached = np.nan_to_num(limits_of_motion, nan=1e9)  # above all others
         expected = np.quantile(reached, [0.16, 0.5, 0.84])
         expected[expected > 1.0] = np.nan
         np.testing.assert_allclose(numbers(words[-5:-2]), expected, rtol=6e-4)
-        assert words[-2:] == [str(own.size), str(int(np.isnan(own).sum()))]
+        assert words[-2:] == [
+            str(limits_of_motion.size),
+            str(int(np.isnan(limits_of_motion).sum())),
+        ]
     assert np.isnan(values).any()
     _, rows = table(text, "limits of the motions, g, at each grid point:", 6)
     np.testing.assert_allclose([numbers(words[-2:]) for words in rows], values.T, rtol=6e-4)
@@ -287,8 +307,8 @@ amplitude = {kind = "factor", distribution = "lognorm", s = 0.3}
     for (name, *words), input_name in zip(rows, means.index, strict=True):
         assert name == input_name
         first = float(data.first_order_index.where(there).sel(input=name).mean())
-        own = data.input.values.tolist().index(name)
-        expected = [first, means[name], np.count_nonzero(largest == own)]
+        place = data.input.values.tolist().index(name)
+        expected = [first, means[name], np.count_nonzero(largest == place)]
         np.testing.assert_allclose(numbers(words), expected, atol=5.1e-4)
     assert (
         f"none at {int((~there).sum())} (no_variance): all runs have the same displacement" in text
@@ -301,18 +321,20 @@ amplitude = {kind = "factor", distribution = "lognorm", s = 0.3}
 def test_friction_has_every_slide(tmp_path: Path) -> None:
     test = Path(__file__).parents[2] / "sweeps" / "data" / "shaking_test.csv"
     text = printed(tmp_path, "friction", test, "--theta", "5", "--mu-s", "0.38")
-    found = slipsweep.measured_friction(test, 5.0, 0.38)
-    heading, rows = table(text, " onset ", found.sizes["slide"])
+    friction = slipsweep.measured_friction(test, 5.0, 0.38)
+    heading, rows = table(text, " onset ", friction.sizes["slide"])
     titles = ["onset", "peak", "stop", "table at onset", "block at most", "least of Eq. 1"]
     assert re.split(r"\s{2,}", heading.strip()) == [*titles, "by statics"]
     columns = ["slide_onset", "slide_peak", "slide_stop", "onset_acceleration"]
     columns += ["peak_block_acceleration", "least_friction", "slide_free_body_friction"]
-    expected = np.column_stack([found[name].values for name in columns])
+    expected = np.column_stack([friction[name].values for name in columns])
     np.testing.assert_allclose([numbers(words) for words in rows], expected, rtol=6e-4)
-    assert text.startswith(f"threshold  {found.attrs['threshold']:.4g} m/s2: 4 standard deviations")
+    assert text.startswith(
+        f"threshold  {friction.attrs['threshold']:.4g} m/s2: 4 standard deviations"
+    )
     for kind in ("static", "kinetic"):
-        value = found[f"{kind}_friction"].item()
-        low, high = found[f"{kind}_friction_interval"].values
+        value = friction[f"{kind}_friction"].item()
+        low, high = friction[f"{kind}_friction_interval"].values
         line = f"{kind + ' friction by statics':<28}{value:.3f}   95 %: {low:.3f} to {high:.3f}\n"
         assert line in text
 
@@ -321,9 +343,9 @@ def test_a_threshold_of_slides_may_be_in_g_of_the_gravity_given(tmp_path: Path) 
     test = Path(__file__).parents[2] / "sweeps" / "data" / "shaking_test.csv"
     block = ("--theta", "5", "--mu-s", "0.38", "--g", "9.7")
     text = printed(tmp_path, "friction", test, *block, "--threshold", "0.1g")
-    found = slipsweep.measured_friction(test, 5.0, 0.38, g=9.7, threshold=0.97)
+    friction = slipsweep.measured_friction(test, 5.0, 0.38, g=9.7, threshold=0.97)
     assert text.startswith("threshold  0.97 m/s2: given\n")
-    assert f"{found.sizes['slide']} slides, s and m/s2:\n" in text
-    _, rows = table(text, " onset ", found.sizes["slide"])
+    assert f"{friction.sizes['slide']} slides, s and m/s2:\n" in text
+    _, rows = table(text, " onset ", friction.sizes["slide"])
     onsets = [numbers(words)[0] for words in rows]
-    np.testing.assert_allclose(onsets, found.slide_onset, rtol=6e-4)
+    np.testing.assert_allclose(onsets, friction.slide_onset, rtol=6e-4)

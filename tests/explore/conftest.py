@@ -16,6 +16,17 @@ from tests.support.pages import SUITE, SWEEP, make
 CHROMIUM = shutil.which("chromium")
 DRIVER = shutil.which("chromedriver")
 
+FLAGS = (
+    "headless=new",
+    "no-sandbox",
+    "disable-gpu",
+    "no-first-run",
+    "disable-background-networking",
+    "disable-component-update",
+    "disable-sync",
+    "window-size=1340,1000",
+)
+
 
 @pytest.fixture(scope="session")
 def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -31,7 +42,7 @@ def written(result: Path) -> Path:
 
 @pytest.fixture(scope="session")
 def suite_page(tmp_path_factory: pytest.TempPathFactory) -> tuple[xr.Dataset, Path]:
-    """Of four motions and both polarities, with a frequency of the structure nowhere."""
+    """A sweep under four motions with both polarities, and its page."""
     folder = tmp_path_factory.mktemp("suite")
     suite = read_suite(
         [SUITE / f"{name}_H1.AT2" for name in ("rock-far", "rock-near", "soft-far", "stiff-pulse")]
@@ -51,8 +62,7 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
         pytest.skip("chromium and chromedriver are not installed")
     options = webdriver.ChromeOptions()
     options.binary_location = CHROMIUM
-    flags = "headless=new no-sandbox disable-gpu no-first-run disable-background-networking disable-component-update"
-    for flag in (*flags.split(), "disable-sync", "window-size=1340,1000"):
+    for flag in FLAGS:
         options.add_argument(f"--{flag}")
     options.add_argument(f"--user-data-dir={tmp_path_factory.mktemp('chromium')}")
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})

@@ -1,8 +1,9 @@
-"""The page in Chromium: it shows the dataset, and runs nothing of a file."""
+"""The page in Chromium shows the dataset, and runs nothing of a file."""
 
 import json
 import math
 import re
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -28,17 +29,25 @@ from slipsweep.model.variables import (
     FlagKind,
     flags_of,
 )
-from tests.support.browser import FOUND, chosen, move, point, show, text_of, wait_for
+from tests.support.browser import (
+    MODEL,
+    choose_layer,
+    chosen,
+    image_of_map,
+    move,
+    point,
+    show,
+    text_of,
+    wait_for,
+)
 from tests.support.pages import AXES, SUITE, contents
 
 
 def test_page_loads_without_errors_and_without_network(opened: Any) -> None:
     move(opened, 0, 1)
     point(opened, 0.3, 0.2, click=True)
-    wrong = [
-        entry for entry in opened.get_log("browser") if entry["level"] not in ("INFO", "DEBUG")
-    ]
-    assert wrong == []
+    entries = opened.get_log("browser")
+    assert [entry for entry in entries if entry["level"] not in ("INFO", "DEBUG")] == []
     events = [json.loads(entry["message"])["message"] for entry in opened.get_log("performance")]
     sent = [event["params"] for event in events if event["method"] == "Network.requestWillBeSent"]
     # the browser's own start page, which it may be loading still, is not ours
@@ -51,148 +60,286 @@ def test_page_loads_without_errors_and_without_network(opened: Any) -> None:
     assert {url.split(":")[0] for url in urls} <= {"file", "data", "blob"}
 
 
-def test_readout_is_the_dataset(opened: Any, result: Path) -> None:
-    with xr.open_dataset(result, mask_and_scale=False) as data:
-        seen = set()
-        for theta, mu_s, x, y in (
-            (0, 0, 0.1, 0.1),
-            (1, 0, 0.92, 0.6),
-            (1, 0, 0.5, 0.75),
-            (1, 0, 0.2, 0.97),
-            (1, 1, 0.33, 0.05),
-            (2, 0, 0.5, 0.5),
-        ):
-            move(opened, theta, mu_s)
-            point(opened, x, y)
-            wait_for(
-                opened,
-                "document.getElementById('readout-title').textContent === 'Cell under the pointer'",
-            )
-            places = (text_of(opened, f"readout-{name}") for name in ("amplitude", "frequency"))
-            amplitude, frequency = (float(text.split()[0]) for text in places)
-            # the cell is where the pointer is: axes from half a cell before the first value to half
-            # a cell after
-            assert abs(amplitude - (12.25 - 11.5 * y)) <= 0.27
-            step = math.log(50) / 17
-            assert abs(math.log(frequency / 0.2) - (-0.5 + 18 * x) * step) <= 0.54 * step
-            cell = data.sel(theta=AXES[0][theta], mu_s=AXES[1][mu_s]).sel(
-                amplitude=amplitude, frequency=frequency, method="nearest"
-            )
-            for name in ("permanent_displacement", "newmark_displacement"):
-                expected = float(cell[name])
-                text = text_of(opened, f"readout-{name}")
-                if math.isnan(expected):
-                    assert text == "no value"
-                else:
-                    metres = float(text.split()[0]) * {"mm": 1e-3, "m": 1.0}[text.split()[1]]
-                    assert metres == pytest.approx(expected, rel=5.1e-4, abs=1e-30)
-            flags = [
-                [f"{kind}: {FLAG_KIND_TEXT[kind]}", f"{(flag.name or '').lower()}: {flag.text}"]
-                for kind in FlagKind
-                for flag in Validity(int(cell.validity)) & flags_of(kind)
-            ]
-            rows = opened.execute_script(
-                "return [...document.querySelectorAll('dd.flag')]"
-                ".map((dd) => [dd.previousSibling.textContent, dd.textContent])"
-            )
-            assert rows == flags
-            mode = SlidingMode(int(cell.sliding_mode)).name.lower()
-            assert text_of(opened, "readout-mode") == mode
-            seen |= {mode, *(flag.split(":")[0] for _, flag in flags)}
-        assert {"stuck", "stick_slip", "continuous", "missing", "statically_unstable"} <= seen
+#: Positions of the sliders of θ and μs, and shares of the map from the upper left.
+POINTED = (
+    (0, 0, 0.1, 0.1),
+    (1, 0, 0.92, 0.6),
+    (1, 0, 0.5, 0.75),
+    (1, 0, 0.2, 0.97),
+    (1, 1, 0.33, 0.05),
+    (2, 0, 0.5, 0.5),
+)
+
+METRES = {"mm": 1e-3, "m": 1.0}
 
 
-def test_the_page_starts_on_a_sound_cell(opened: Any, result: Path) -> None:
-    index = chosen(opened)
+@dataclass(frozen=True)
+class Readout:
+    """Readout of the cell at a point of the map, and that cell in the dataset."""
+
+    x: float
+    y: float
+    amplitude: float
+    frequency: float
+    displacements: dict[str, str]
+    flags: list[list[str]]
+    mode: str
+    cell: xr.Dataset
+
+
+@pytest.fixture(scope="module")
+def readouts(browser: Any, written: Path, result: Path) -> list[Readout]:
+    show(browser, written)
     with xr.open_dataset(result, mask_and_scale=False) as data:
-        cell = data.isel(dict(zip(("theta", "mu_s", "amplitude", "frequency"), index, strict=True)))
+        return [_readout(browser, data, *place) for place in POINTED]
+
+
+def _readout(browser: Any, data: xr.Dataset, theta: int, mu_s: int, x: float, y: float) -> Readout:
+    move(browser, theta, mu_s)
+    point(browser, x, y)
+    title = "document.getElementById('readout-title').textContent"
+    wait_for(browser, f"{title} === 'Cell under the pointer'")
+    amplitude, frequency = (
+        float(text_of(browser, f"readout-{name}").split()[0]) for name in ("amplitude", "frequency")
+    )
+    cell = data.sel(theta=AXES[0][theta], mu_s=AXES[1][mu_s])
+    displacements = {
+        name: text_of(browser, f"readout-{name}")
+        for name in ("permanent_displacement", "newmark_displacement")
+    }
+    flag_rows = browser.execute_script(
+        "return [...document.querySelectorAll('dd.flag')]"
+        ".map((dd) => [dd.previousSibling.textContent, dd.textContent])"
+    )
+    return Readout(
+        x,
+        y,
+        amplitude,
+        frequency,
+        displacements,
+        flag_rows,
+        text_of(browser, "readout-mode"),
+        cell.sel(amplitude=amplitude, frequency=frequency, method="nearest"),
+    )
+
+
+def test_readout_is_of_the_cell_under_the_pointer(readouts: list[Readout]) -> None:
+    """Axes reach from half a cell before the first value to half a cell after the last."""
+    step = math.log(50) / 17
+    for readout in readouts:
+        assert abs(readout.amplitude - (12.25 - 11.5 * readout.y)) <= 0.27
+        steps = math.log(readout.frequency / 0.2) / step
+        assert abs(steps - (-0.5 + 18 * readout.x)) <= 0.54
+
+
+def test_readout_has_the_displacements_of_the_dataset(readouts: list[Readout]) -> None:
+    valueless = 0
+    for readout in readouts:
+        for name, text in readout.displacements.items():
+            expected = float(readout.cell[name])
+            if math.isnan(expected):
+                assert text == "no value"
+                valueless += 1
+            else:
+                number, unit = text.split()
+                metres = float(number) * METRES[unit]
+                assert metres == pytest.approx(expected, rel=5.1e-4, abs=1e-30)
+    assert valueless
+
+
+def test_readout_has_the_flags_of_the_dataset(readouts: list[Readout]) -> None:
+    names = set()
+    for readout in readouts:
+        validity = Validity(int(readout.cell.validity))
+        expected = [
+            [f"{kind}: {FLAG_KIND_TEXT[kind]}", f"{(flag.name or '').lower()}: {flag.text}"]
+            for kind in FlagKind
+            for flag in validity & flags_of(kind)
+        ]
+        assert readout.flags == expected
+        names |= {text.split(":")[0] for _, text in expected}
+    assert "statically_unstable" in names
+
+
+def test_readout_has_the_sliding_mode_of_the_dataset(readouts: list[Readout]) -> None:
+    for readout in readouts:
+        assert readout.mode == SlidingMode(int(readout.cell.sliding_mode)).name.lower()
+    modes = {readout.mode for readout in readouts}
+    assert {"stuck", "stick_slip", "continuous", "missing"} <= modes
+
+
+DIMS = ("theta", "mu_s", "amplitude", "frequency")
+
+
+def test_the_page_starts_on_a_cell_that_slides_without_a_caution(opened: Any, result: Path) -> None:
+    with xr.open_dataset(result, mask_and_scale=False) as data:
+        cell = data.isel(dict(zip(DIMS, chosen(opened), strict=True)))
         assert cell.permanent_displacement > 0
         assert not Validity(int(cell.validity)) & (CAUTIONS | VALUELESS)
 
 
-def test_nothing_of_a_file_runs_in_the_page(browser: Any, tmp_path: Path) -> None:
-    """A dimension's and a motion's names, a title: all are text."""
-    name = "<img src=x onerror=document.title='run'>"
-    label = "<!--<script>document.title='run'"
-    suite = read_suite([SUITE / f"{one}_H1.AT2" for one in ("rock-far", "rock-near")])
+def test_the_page_does_not_start_on_a_cell_with_a_caution(
+    opened: Any, result: Path, tmp_path: Path
+) -> None:
+    """The cell on which it would start has one in another file."""
+    first = chosen(opened)
+    data = xr.load_dataset(result, mask_and_scale=False)
+    data.validity[dict(zip(DIMS, first, strict=True))] |= int(CAUTIONS)
+    data.to_netcdf(tmp_path / "caution.nc")
+    write_page(tmp_path / "caution.nc", tmp_path / "page.html")
+    show(opened, tmp_path / "page.html")
+    assert chosen(opened) != first
+
+
+@pytest.fixture
+def hostile(browser: Any, tmp_path: Path) -> Any:
+    """The page of a file whose title, dimension and motions have the names of scripts."""
+    suite = read_suite([SUITE / f"{name}_H1.AT2" for name in ("rock-far", "rock-near")])
     data = sweep(5, [0.1, 0.2], amplitude=[2.0, 4.0], excitation=suite)
-    data = data.assign_coords(motion=[label, "</script><script>document.title='run'</script>"])
-    data = data.expand_dims({name: 2}).assign_attrs(title=name, friction_inputs=label)
-    data.to_zarr(tmp_path / "own.zarr", zarr_format=3)
-    write_page(tmp_path / "own.zarr", tmp_path / "page.html")
+    data = data.assign_coords(motion=[LABEL, "</script><script>document.title='run'</script>"])
+    data = data.expand_dims({NAME: 2}).assign_attrs(title=NAME, friction_inputs=LABEL)
+    data.to_zarr(tmp_path / "hostile.zarr", zarr_format=3)
+    write_page(tmp_path / "hostile.zarr", tmp_path / "page.html")
     browser.get_log("browser")
     show(browser, tmp_path / "page.html")
-    assert browser.title == name
-    assert label in text_of(browser, "slider-motion")
-    assert browser.execute_script("return document.querySelectorAll('img').length") == 0
-    assert [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"] == []
-    # the policy stops a script that gets into the page all the same
-    browser.execute_script(
-        "const s = document.createElement('script'); s.textContent = 'document.title = 1'; document.body.append(s)"
-    )
-    assert browser.title == name
+    return browser
 
 
-def test_history_is_of_the_very_cell_that_is_named(opened: Any) -> None:
-    move(opened, 1, 0)
-    point(opened, 0.4, 0.25, click=True)
-    index = chosen(opened)
-    assert chosen(opened, "history-note") == index
-    theta, mu_s, amplitude, frequency = (
-        float(axis[at]) for axis, at in zip(AXES, index, strict=True)
+NAME = "<img src=x onerror=document.title='run'>"
+LABEL = "<!--<script>document.title='run'"
+
+
+def test_names_and_titles_of_a_file_are_text_in_the_page(hostile: Any) -> None:
+    assert hostile.title == NAME
+    assert LABEL in text_of(hostile, "slider-motion")
+    assert hostile.execute_script("return document.querySelectorAll('img').length") == 0
+    assert [entry for entry in hostile.get_log("browser") if entry["level"] == "SEVERE"] == []
+
+
+def test_a_script_that_gets_into_the_page_does_not_run(opened: Any) -> None:
+    title = opened.title
+    opened.execute_script(
+        "const script = document.createElement('script');"
+        "script.textContent = 'document.title = 1'; document.body.append(script)"
     )
-    assert (theta, mu_s) == (5, 0.3)
-    assert text_of(opened, "history-note").endswith("the first 3 of 4 cycles.")
-    drawn = opened.execute_script(
-        FOUND + "const d = found('history').data; return [[...d.t], [...d.v], [...d.u]]"
+    assert opened.title == title
+
+
+@dataclass(frozen=True)
+class DrawnHistory:
+    """History of a cell that was clicked: texts, columns, and ends of the axes of accelerations."""
+
+    index: list[int]
+    index_of_note: list[int]
+    note: str
+    summary: str
+    columns: dict[str, list[float]]
+    ends: list[float]
+
+
+@pytest.fixture(scope="module")
+def drawn(browser: Any, written: Path) -> DrawnHistory:
+    """History after a click on a cell of θ = 5°, μs = 0.3."""
+    show(browser, written)
+    move(browser, 1, 0)
+    point(browser, 0.4, 0.25, click=True)
+    columns = browser.execute_script(
+        MODEL + "return Object.fromEntries("
+        "Object.entries(model('history').data).map(([name, values]) => [name, [...values]]))"
     )
-    expected = simulate(
-        theta, mu_s, amplitude, frequency, times=drawn[0], excitation=Sine(cycles=4)
+    ends = browser.execute_script(
+        MODEL + "const range = model('accelerations_range');"
+        "return [range.start, range.end, model('accelerations_g').end]"
     )
-    assert drawn[0][-1] == pytest.approx(3 / frequency, rel=1e-12)
-    for values, exact in (
-        (drawn[1], expected.relative_velocity),
-        (drawn[2], expected.relative_displacement * 1000),
+    return DrawnHistory(
+        chosen(browser),
+        chosen(browser, "history-note"),
+        text_of(browser, "history-note"),
+        text_of(browser, "history-summary"),
+        columns,
+        ends,
+    )
+
+
+@pytest.fixture(scope="module")
+def simulated(drawn: DrawnHistory) -> xr.Dataset:
+    """History of the chosen cell, computed at the times that are drawn."""
+    cell = [float(axis[place]) for axis, place in zip(AXES, drawn.index, strict=True)]
+    return simulate(*cell, times=drawn.columns["t"], excitation=Sine(cycles=4))
+
+
+def test_history_is_of_the_cell_that_is_named(drawn: DrawnHistory) -> None:
+    assert drawn.index[:2] == [1, 0]
+    assert drawn.index_of_note == drawn.index
+    assert drawn.note.endswith("the first 3 of 4 cycles.")
+
+
+def test_history_has_three_cycles(drawn: DrawnHistory) -> None:
+    frequency = AXES[3][drawn.index[3]]
+    assert drawn.columns["t"][-1] == pytest.approx(3 / frequency, rel=1e-12)
+
+
+def test_history_has_the_velocity_and_displacement_of_simulate(
+    drawn: DrawnHistory, simulated: xr.Dataset
+) -> None:
+    for values, expected in (
+        (drawn.columns["v"], simulated.relative_velocity),
+        (drawn.columns["u"], simulated.relative_displacement * 1000),
     ):
-        assert float(exact.max()) > 0.0
-        np.testing.assert_allclose(values, exact, rtol=0, atol=float(exact.max()) / 30_000)
-    shown = opened.execute_script(
-        FOUND + "const d = found('history').data, r = found('accelerations_range');"
-        "return [[...d.ground], [...d.block], r.start, r.end, found('accelerations_g').end]"
-    )
-    for values, exact in (
-        (shown[0], expected.ground_acceleration),
-        (shown[1], expected.block_acceleration),
+        assert float(expected.max()) > 0.0
+        np.testing.assert_allclose(values, expected, rtol=0, atol=float(expected.max()) / 30_000)
+
+
+def test_history_has_the_accelerations_of_simulate(
+    drawn: DrawnHistory, simulated: xr.Dataset
+) -> None:
+    for values, expected in (
+        (drawn.columns["ground"], simulated.ground_acceleration),
+        (drawn.columns["block"], simulated.block_acceleration),
     ):
-        differs = np.abs(np.array(values) - exact.values) > float(np.abs(exact).max()) / 30_000
+        tolerance = float(np.abs(expected).max()) / 30_000
+        differs = np.abs(np.array(values) - expected.values) > tolerance
         assert np.count_nonzero(differs) <= 3  # where braking begins, once a cycle
-    most = 1.05 * np.abs(shown[:2]).max()
-    assert shown[2:] == pytest.approx([-most, most, most / 9.81], rel=1e-12)
-    summary = text_of(opened, "history-summary")
-    (fastest,) = re.findall(r"Largest velocity ([\d.]+) m/s;", summary)
-    assert float(fastest) == pytest.approx(max(drawn[1]), rel=1e-4)
-    (said,) = re.findall(r"at the end ([\d.]+ m?m)\.$", summary)
-    assert said == f"{drawn[2][-1]:.{len(said.split()[0].partition('.')[2])}f} mm"
 
 
-def test_map_colours_are_the_dataset(opened: Any) -> None:
-    """The picture itself: every pixel has the displacement of the cell it lies in."""
+def test_axes_of_accelerations_hold_both_in_metres_and_in_g(drawn: DrawnHistory) -> None:
+    most = 1.05 * np.abs([drawn.columns["ground"], drawn.columns["block"]]).max()
+    assert drawn.ends == pytest.approx([-most, most, most / 9.81], rel=1e-12)
+
+
+def test_the_summary_of_a_history_has_its_largest_velocity_and_last_displacement(
+    drawn: DrawnHistory,
+) -> None:
+    (fastest,) = re.findall(r"Largest velocity ([\d.]+) m/s;", drawn.summary)
+    assert float(fastest) == pytest.approx(max(drawn.columns["v"]), rel=1e-4)
+    (moved,) = re.findall(r"at the end ([\d.]+) mm\.$", drawn.summary)
+    assert float(moved) == pytest.approx(drawn.columns["u"][-1], rel=5.1e-4)
+
+
+def cells_of_map(driver: Any) -> np.ndarray:
+    """Numbers that give the cells of the map their colours, from the pixels in their middles."""
+    image = image_of_map(driver)
+    rows = ((np.arange(23) + 0.5) * image.shape[0] / 23).astype(int)
+    columns = ((np.arange(18) + 0.5) * image.shape[1] / 18).astype(int)
+    return image[np.ix_(rows, columns)]
+
+
+def test_colours_of_the_map_are_the_displacements_of_its_cells(opened: Any) -> None:
     move(opened, 1, 0)
-    shape, values = opened.execute_script(
-        FOUND + "const d = found('colours').data.image[0]; return [d.shape, [...d]]"
-    )
-    script = "return ['map_g', 'y_range'].map(found).map((one) => [one.start, one.end])"
-    in_g, ends = np.array(opened.execute_script(FOUND + script))
-    np.testing.assert_allclose(in_g * 9.81, ends, rtol=1e-12)
-    seen = np.reshape(np.array(values, float), shape)  # from below
     mm = 1000 * sweep(5, 0.3, *AXES[2:], excitation=Sine(cycles=4)).permanent_displacement.values
-    rows = ((np.arange(23) + 0.5) * seen.shape[0] / 23).astype(int)
-    columns = ((np.arange(18) + 0.5) * seen.shape[1] / 18).astype(int)
-    np.testing.assert_allclose(seen[np.ix_(rows, columns)], np.where(mm > 0, mm, np.nan), rtol=1e-6)
+    np.testing.assert_allclose(cells_of_map(opened), np.where(mm > 0, mm, np.nan), rtol=1e-6)
 
 
-def test_the_summary_of_the_map_is_its_dataset_in_words(opened: Any, result: Path) -> None:
-    """Counts of cells by kind and the range of the displacements, for those who do not see the picture."""
+def test_the_axis_in_g_is_the_axis_in_metres_over_g(opened: Any) -> None:
+    script = "return ['map_g', 'y_range'].map(model).map((range) => [range.start, range.end])"
+    in_g, ends = np.array(opened.execute_script(MODEL + script))
+    np.testing.assert_allclose(in_g * 9.81, ends, rtol=1e-12)
+
+
+def test_the_summary_of_the_map_counts_its_cells_and_has_their_range(
+    opened: Any, result: Path
+) -> None:
+    """Those who do not see the picture read of its kinds of cells and its displacements."""
     names = [(flag.name or "").lower() for flag in CAUTIONS]
     for theta, mu_s in ((1, 0), (2, 0)):
         move(opened, theta, mu_s)
@@ -206,7 +353,7 @@ def test_the_summary_of_the_map_is_its_dataset_in_words(opened: Any, result: Pat
             "with a caution": caution,
             "upslope": u < 0.0,
         }
-        words = [f", {int(one.sum())} {text}" for text, one in counts.items() if one.any()]
+        words = [f", {int(kind.sum())} {text}" for text, kind in counts.items() if kind.any()]
         expected = (
             "peak ground acceleration A (m/s²) over excitation frequency f (Hz). "
             f"{u.size} cells{''.join(words)}"
@@ -216,68 +363,78 @@ def test_the_summary_of_the_map_is_its_dataset_in_words(opened: Any, result: Pat
         ends = re.findall(r"; from ([\d.]+) (m+) to ([\d.]+) (m+)\.$", summary)
         assert bool(ends) == bool((u > 0.0).any())
         for low, low_unit, high, high_unit in ends:
-            metres = {"mm": 1e-3, "m": 1.0}
             slides = u.where(u > 0.0)
-            assert float(low) * metres[low_unit] == pytest.approx(float(slides.min()), rel=6e-4)
-            assert float(high) * metres[high_unit] == pytest.approx(float(slides.max()), rel=6e-4)
+            assert float(low) * METRES[low_unit] == pytest.approx(float(slides.min()), rel=6e-4)
+            assert float(high) * METRES[high_unit] == pytest.approx(float(slides.max()), rel=6e-4)
 
 
 def test_the_other_layer_is_newmarks_block(opened: Any, result: Path) -> None:
-    """Its colours, its title, and the line of the readout."""
+    """Its title and its colours."""
     move(opened, 1, 0)
-    opened.execute_script(
-        "const list = document.getElementById('layer');"
-        "list.selectedIndex = 1; list.dispatchEvent(new Event('change'))"
-    )
-    try:
-        assert text_of(opened, "map-title") == RESULTS["newmark_displacement"]["long_name"]
-        shape, values = opened.execute_script(
-            FOUND + "const d = found('colours').data.image[0]; return [d.shape, [...d]]"
-        )
-        seen = np.reshape(np.array(values, float), shape)
-        with xr.open_dataset(result) as data:
-            mm = 1000.0 * data.newmark_displacement.isel(theta=1, mu_s=0).values
-        rows = ((np.arange(23) + 0.5) * seen.shape[0] / 23).astype(int)
-        columns = ((np.arange(18) + 0.5) * seen.shape[1] / 18).astype(int)
-        expected = np.where(mm > 0, mm, np.nan)
-        np.testing.assert_allclose(seen[np.ix_(rows, columns)], expected, rtol=1e-6)
-    finally:
-        show(opened, result.with_suffix(".html"))
+    choose_layer(opened, 1)
+    assert text_of(opened, "map-title") == RESULTS["newmark_displacement"]["long_name"]
+    with xr.open_dataset(result) as data:
+        mm = 1000.0 * data.newmark_displacement.isel(theta=1, mu_s=0).values
+    np.testing.assert_allclose(cells_of_map(opened), np.where(mm > 0, mm, np.nan), rtol=1e-6)
 
 
-def test_cells_with_a_history_are_marked_where_they_are(opened: Any, written: Path) -> None:
+def test_cells_with_a_history_have_a_dot_in_the_map(opened: Any, written: Path) -> None:
     move(opened, 1, 0)
     meta, arrays = contents(written)
     store = meta["histories"]["keep"]
-    there = np.isfinite(arrays["history_scale"][..., 0])
-    rows = there[store["theta"].index(1), store["mu_s"].index(0)]
+    has_history = np.isfinite(arrays["history_scale"][..., 0])
+    rows = has_history[store["theta"].index(1), store["mu_s"].index(0)]
     amplitudes = np.array(AXES[2])[store["amplitude"]][rows]
     expected = {(float(f), float(a)) for f in AXES[3] for a in amplitudes}
-    drawn = opened.execute_script(
-        FOUND + "const d = found('held').data; return [[...d.x], [...d.y]]"
+    dots = opened.execute_script(
+        MODEL + "const dots = model('cells_with_history').data; return [[...dots.x], [...dots.y]]"
     )
-    points = np.array(sorted(zip(*drawn, strict=True)))
-    np.testing.assert_allclose(points, sorted(expected), rtol=1e-12)
+    np.testing.assert_allclose(sorted(zip(*dots, strict=True)), sorted(expected), rtol=1e-12)
 
 
-def test_zoom_shows_a_part_about_the_chosen_cell(opened: Any) -> None:
-    """Half of both axes, on the scale of each; the whole map again."""
+def ranges(driver: Any) -> np.ndarray:
+    """Ends of the axes of the map, across and up."""
+    script = "return ['x_range', 'y_range'].map(model).map((range) => [range.start, range.end])"
+    return np.array(driver.execute_script(MODEL + script))
 
-    def ranges() -> np.ndarray:
-        script = "const r = ['x_range', 'y_range'].map(found); return r.map((one) => [one.start, one.end])"
-        return np.array(opened.execute_script(FOUND + script))
 
-    move(opened, 1, 0)
-    whole = ranges()
+def press(driver: Any, button: str) -> None:
+    driver.execute_script("document.getElementById(arguments[0]).click()", button)
+
+
+def test_the_map_reaches_half_a_cell_beyond_its_values(opened: Any) -> None:
+    across, up = ranges(opened)
     step = np.log10(50) / 17
-    np.testing.assert_allclose(np.log10(whole[0]), [np.log10(0.2) - step / 2, 1 + step / 2])
-    np.testing.assert_allclose(whole[1], [0.75, 12.25])
-    opened.execute_script("document.getElementById('zoom-in').click()")
-    part = ranges()
-    assert np.ptp(np.log10(part[0])) == pytest.approx(0.5 * np.ptp(np.log10(whole[0])))
-    assert np.ptp(part[1]) == pytest.approx(0.5 * np.ptp(whole[1]))
+    np.testing.assert_allclose(np.log10(across), [np.log10(0.2) - step / 2, 1 + step / 2])
+    np.testing.assert_allclose(up, [0.75, 12.25])
+
+
+def test_zoom_shows_half_of_both_axes_about_the_chosen_cell(opened: Any) -> None:
+    move(opened, 1, 0)
+    across, up = ranges(opened)
+    press(opened, "zoom-in")
+    part_across, part_up = ranges(opened)
+    assert np.ptp(np.log10(part_across)) == pytest.approx(0.5 * np.ptp(np.log10(across)))
+    assert np.ptp(part_up) == pytest.approx(0.5 * np.ptp(up))
     _, _, amplitude, frequency = chosen(opened)
-    assert part[0][0] < AXES[3][frequency] < part[0][1]
-    assert part[1][0] < AXES[2][amplitude] < part[1][1]
-    opened.execute_script("document.getElementById('zoom-whole').click()")
-    np.testing.assert_allclose(ranges(), whole)
+    assert part_across[0] < AXES[3][frequency] < part_across[1]
+    assert part_up[0] < AXES[2][amplitude] < part_up[1]
+
+
+@pytest.mark.parametrize("button", ["zoom-out", "zoom-whole"])
+def test_zoom_shows_the_whole_map_again(opened: Any, button: str) -> None:
+    whole = ranges(opened)
+    press(opened, "zoom-in")
+    press(opened, button)
+    np.testing.assert_allclose(ranges(opened), whole)
+
+
+def test_a_slider_takes_the_zoomed_map_along_with_the_chosen_cell(opened: Any) -> None:
+    press(opened, "zoom-in")
+    opened.execute_script(
+        "const slider = document.getElementById('slider-amplitude');"
+        "slider.value = 22; slider.dispatchEvent(new Event('input'))"
+    )
+    _, up = ranges(opened)
+    assert up[1] == pytest.approx(12.25)
+    assert np.ptp(up) == pytest.approx(0.5 * 11.5)

@@ -1,4 +1,4 @@
-"""The empty figures of the page: labels, units, legends, and the colours that displacements get."""
+"""Figures of the page before they have data: labels, units, legends, scales of colours."""
 
 from pathlib import Path
 from typing import Any
@@ -13,9 +13,10 @@ from slipsweep.explore.excerpt import Excerpt, read_excerpt
 
 
 def excerpt_of(displacements: Any) -> Excerpt:
-    """An excerpt of nothing but displacements, m."""
-    moved = xr.Dataset({"permanent_displacement": ("amplitude", np.asarray(displacements, float))})
-    return Excerpt(moved, ("amplitude", "frequency"), {}, {}, {})
+    """Excerpt that has displacements, m, and nothing else."""
+    values = np.asarray(displacements, float)
+    table = xr.Dataset({"permanent_displacement": ("amplitude", values)})
+    return Excerpt(table, ("amplitude", "frequency"), {}, {}, {})
 
 
 @pytest.mark.parametrize(
@@ -33,17 +34,17 @@ def test_colours_span_five_decades_at_most(
     lowest: float, highest: float, decades: tuple[int, int]
 ) -> None:
     """Of nine cells in ten; zeros, missing ones and the twentieth at each end do not count."""
-    moved = [0.0, np.nan, -1.0, 1e-15, *np.geomspace(lowest, highest, 100), 1e9]
-    assert figures.decades(excerpt_of(moved)) == decades
+    displacements = [0.0, np.nan, -1.0, 1e-15, *np.geomspace(lowest, highest, 100), 1e9]
+    assert figures.decades(excerpt_of(displacements)) == decades
 
 
 def test_colours_of_nothing_span_a_decade() -> None:
     assert figures.decades(excerpt_of([0.0, np.nan])) == (0, 1)
 
 
-def test_bars_of_colours_have_three_bands_a_decade_and_lengths_at_their_edges() -> None:
+def test_colours_of_displacements_have_three_bands_a_decade_and_lengths_at_its_ends() -> None:
     pytest.importorskip("bokeh")
-    mapper, bar = figures._colours("displacement", (0, 4))
+    mapper, bar = figures.colours_and_bar("displacement", (0, 4))
     assert len(mapper.palette) == 3 * 4
     assert (mapper.low, mapper.high) == (1.0, 1e4)  # mm
     assert bar.major_label_overrides == {
@@ -53,21 +54,25 @@ def test_bars_of_colours_have_three_bands_a_decade_and_lengths_at_their_edges() 
         1000.0: "1 m",
         10000.0: "10 m",
     }
-    mapper, bar = figures._colours("probability", (0, 4))
+
+
+def test_colours_of_probabilities_have_ten_bands() -> None:
+    pytest.importorskip("bokeh")
+    mapper, bar = figures.colours_and_bar("probability", (0, 4))
     assert (mapper.low, mapper.high, len(mapper.palette)) == (0.0, 1.0, 10)
     assert list(bar.major_label_overrides.values()) == ["0", "0.2", "0.4", "0.6", "0.8", "1"]
 
 
 def test_panels_of_a_history_have_their_quantities_and_units() -> None:
     pytest.importorskip("bokeh")
-    panels = figures._panels().children
+    panels = figures.history_panels().children
     assert [panel.yaxis[0].axis_label for panel in panels] == [
         "acceleration (m/s²)",
         "velocity (m/s)",
         "displacement (mm)",
     ]
     assert panels[-1].xaxis[0].axis_label == "time (s)"
-    lines = [[one.glyph.y for one in panel.renderers] for panel in panels]
+    lines = [[line.glyph.y for line in panel.renderers] for panel in panels]
     assert lines == [["ground", "block"], ["v"], ["u"]]
     (legend,) = panels[0].legend
     drawn = {item.label.value: item.renderers[0].glyph.y for item in legend.items}
@@ -110,15 +115,16 @@ def test_axes_of_the_map_have_names_units_and_scales(
     logs: tuple[bool, bool],
     has_g: bool,
 ) -> None:
-    """Frequencies, and axes that are spread by factors, are logarithmic; accelerations have a second axis in g."""
+    """Frequencies, and axes of constant ratios, are logarithmic; accelerations are also in g."""
     pytest.importorskip("bokeh")
-    given: dict[str, Any] = {"theta": 5.0, "mu_s": 0.4} | axes
-    sweep(**given).to_netcdf(tmp_path / "a.nc")
-    chart = figures._map(read_excerpt(tmp_path / "a.nc", 1000))
+    parameters: dict[str, Any] = {"theta": 5.0, "mu_s": 0.4} | axes
+    sweep(**parameters).to_netcdf(tmp_path / "a.nc")
+    chart = figures.map_figure(read_excerpt(tmp_path / "a.nc", 1000))
     scales = [type(scale).__name__ == "LogScale" for scale in (chart.y_scale, chart.x_scale)]
     assert tuple(scales) == logs
-    words = [
-        f"{label}{', logarithmic scale' * log}" for label, log in zip(labels, logs, strict=True)
+    titles = [
+        f"{label}, logarithmic scale" if log else label
+        for label, log in zip(labels, logs, strict=True)
     ]
-    assert [chart.yaxis[0].axis_label, chart.xaxis[0].axis_label] == words
+    assert [chart.yaxis[0].axis_label, chart.xaxis[0].axis_label] == titles
     assert ("(g)" in [axis.axis_label for axis in chart.yaxis]) == has_g

@@ -99,8 +99,8 @@ def test_a_table_has_every_cell_once(
         )
         np.testing.assert_array_equal(read_back, expected[name].to_numpy(read_back.dtype))
         if read_back.dtype == np.float32 and suffix != ".parquet":  # and no more
-            assert [f"{one:.9g}" for one in table[name]] == [
-                f"{float(str(one)):.9g}" for one in read_back
+            assert [f"{number:.9g}" for number in table[name]] == [
+                f"{float(str(number)):.9g}" for number in read_back
             ]
 
 
@@ -124,8 +124,8 @@ def test_a_dimension_that_no_variable_has_is_left_out(tmp_path: Path) -> None:
 def test_codes_are_spelled_out_on_request(folder: Path, tmp_path: Path) -> None:
     codes = tmp_path / "codes.csv"
     words = tmp_path / "words.csv"
-    for path, wanted in ((codes, False), (words, True)):
-        export.export(folder / "cases.nc", path, words=wanted)
+    for path, spelled_out in ((codes, False), (words, True)):
+        export.export(folder / "cases.nc", path, words=spelled_out)
     coded = bare(read(codes))
     worded = bare(read(words))
     assert list(worded["label"]) == ["mild ± slope, wet", "steep"] * 3
@@ -140,6 +140,18 @@ def test_codes_are_spelled_out_on_request(folder: Path, tmp_path: Path) -> None:
     ]
     assert "statically_unstable" in flags
     assert ["" if pd.isna(flag) else flag for flag in worded["validity"]] == flags
+
+
+def test_several_flags_of_a_cell_are_spelled_one_after_the_other(tmp_path: Path) -> None:
+    """Just above the mode limit, of a block whose friction is estimated."""
+    text = (
+        "[axes]\ntheta.values = [5]\nmu_s.values = [0.38]\n"
+        "amplitude.values = [6.8]\nfrequency.values = [1]\n"
+    )
+    store.run(sweep_job(spec.parse(text, "x")), tmp_path / "a.nc", command="x")
+    export.export(tmp_path / "a.nc", tmp_path / "a.csv", words=True)
+    (flags,) = bare(read(tmp_path / "a.csv"))["validity"]
+    assert flags == "near_mode_limit friction_estimated"
 
 
 def test_a_parquet_file_tells_how_it_was_made(folder: Path, tmp_path: Path) -> None:
@@ -172,20 +184,28 @@ def test_export_writes_the_rows_that_it_counts(folder: Path) -> None:
     )
 
 
-def test_what_cannot_be_exported(folder: Path, tmp_path: Path) -> None:
-    (tmp_path / "other.nc").write_text("nothing")
-    for arguments, options, message in (
-        (("grid.nc", "t.txt"), {}, "the name must end in one of .csv, .parquet, .xlsx"),
+@pytest.mark.parametrize(
+    ("source", "output", "options", "message"),
+    [
+        ("grid.nc", "t.txt", {}, "the name must end in one of .csv, .parquet, .xlsx"),
         (
-            ("grid.nc", "t.csv"),
+            "grid.nc",
+            "t.csv",
             {"variables": ["permanent_displacment"]},
             'did you mean "permanent_displacement"',
         ),
-        (("none.nc", "t.csv"), {}, "none.nc: no such file"),
-        ((str(tmp_path / "other.nc"), "t.csv"), {}, "not a netCDF file"),
-    ):
-        with pytest.raises(InputError, match=message):
-            export.export(folder / arguments[0], tmp_path / arguments[1], **options)  # type: ignore[arg-type]
+        ("none.nc", "t.csv", {}, "none.nc: no such file"),
+        ("OTHER", "t.csv", {}, "not a netCDF file"),
+    ],
+)
+def test_a_wrong_name_is_refused_and_nothing_written(
+    folder: Path, tmp_path: Path, source: str, output: str, options: Any, message: str
+) -> None:
+    other = tmp_path / "other.nc"
+    other.write_text("nothing")
+    path = other if source == "OTHER" else folder / source
+    with pytest.raises(InputError, match=message):
+        export.export(path, tmp_path / output, **options)
     assert [entry.name for entry in tmp_path.iterdir()] == ["other.nc"]
 
 
@@ -310,11 +330,12 @@ def test_a_pivoted_table_of_a_result_has_the_axes_of_that_result(
         ),
         (
             ("--columns", "mu_s", "--rows", "theta", "--at", "frequency=2"),
-            "neither in --rows nor in --columns: displacement_amplitude (3 values), decay_rate (2 values)",
+            "neither in --rows nor in --columns: displacement_amplitude (3 values), decay_rate "
+            "(2 values)",
         ),
     ],
 )
-def test_what_is_no_slice(
+def test_wrong_options_of_a_slice_are_refused_in_a_line(
     folder: Path, tmp_path: Path, options: tuple[str, ...], message: str
 ) -> None:
     done = command(folder, "export", "grid.nc", "-o", tmp_path / "t.csv", *options)
@@ -332,7 +353,7 @@ def test_a_case_is_cut_by_its_label(folder: Path, tmp_path: Path) -> None:
 
 
 def test_a_spreadsheet_says_what_it_is_of(folder: Path, tmp_path: Path) -> None:
-    """Read by another program: a sheet for each result, and one of inputs, estimates, flags and provenance."""
+    """Another program reads a sheet for each result, and those of inputs, flags and provenance."""
     path = tmp_path / "t.xlsx"
     export.export(
         folder / "cases.nc", path, columns="frequency", at={"case": "steep,1"}, words=True
@@ -392,15 +413,15 @@ def test_texts_that_a_spreadsheet_computes_are_quoted_in_csv(tmp_path: Path, beg
     assert {row.split(",")[at] for row in rows[1:]} == {"-1.0", "-2.0"}
 
 
-def test_accelerations_in_g(folder: Path, tmp_path: Path) -> None:
+def test_accelerations_are_written_in_g_on_request(folder: Path, tmp_path: Path) -> None:
     export.export(folder / "grid.nc", tmp_path / "t.csv", in_g=True)
     export.export(folder / "grid.nc", tmp_path / "u.csv")
-    found = read(tmp_path / "t.csv")
+    frame = read(tmp_path / "t.csv")
     plain = read(tmp_path / "u.csv")
     np.testing.assert_allclose(
-        found["limiting_acceleration (g)"], plain["limiting_acceleration (m s-2)"] / 9.81, rtol=1e-6
+        frame["limiting_acceleration (g)"], plain["limiting_acceleration (m s-2)"] / 9.81, rtol=1e-6
     )
-    assert "permanent_displacement (m)" in found
+    assert "permanent_displacement (m)" in frame
 
 
 @pytest.mark.parametrize(
@@ -409,7 +430,8 @@ def test_accelerations_in_g(folder: Path, tmp_path: Path) -> None:
         (
             1200,
             {},
-            "the table has 1440000 rows (1200 theta x 1200 mu_s) and 3 columns, a sheet of .xlsx 1048576",
+            "the table has 1440000 rows (1200 theta x 1200 mu_s) and 3 columns, a sheet of .xlsx "
+            "1048576",
         ),
         (524288, {}, "the table has 1048576 rows"),
         (
@@ -419,7 +441,7 @@ def test_accelerations_in_g(folder: Path, tmp_path: Path) -> None:
         ),
     ],
 )
-def test_what_no_spreadsheet_holds(
+def test_a_table_larger_than_a_sheet_is_refused(
     tmp_path: Path, num: int, options: dict[str, Any], message: str
 ) -> None:
     shape = (num, 1200 if num == 1200 else 2)
@@ -466,7 +488,7 @@ def test_flags_are_the_bits(folder: Path, chunks: dict[str, int] | None) -> None
         (xr.DataArray(3, name="depth"), "depth: no bit mask, 0 flag_masks and 0 flag_meanings"),
     ],
 )
-def test_what_has_no_flags(data: xr.Dataset | xr.DataArray, message: str) -> None:
+def test_data_without_flags_are_refused(data: xr.Dataset | xr.DataArray, message: str) -> None:
     with pytest.raises(InputError, match=message):
         slipsweep.flags(data)
 

@@ -1,4 +1,4 @@
-"""What a user meets while a sweep runs, a round or two of each kind; `benchmarks.faults` does fifty."""
+"""Faults while a sweep runs, a round or two of each kind; `benchmarks.faults` does fifty."""
 
 import random
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Files opened by the programs of others: CF checker, ncdump, NCO, CDO and GNU Octave read what was written."""
+"""Result files in the programs of others: CF checker, ncdump, NCO, CDO and GNU Octave."""
 
 import os
 import re
@@ -23,7 +23,13 @@ amplitude.values = [1, 4, 8]
 frequency.values = [1, 2]
 structure_frequency.values = [0.5, 4]
 [output]
-variables = ["permanent_displacement", "peak_relative_velocity", "sliding_mode", "validity", "acceleration_ratio"]
+variables = [
+    "permanent_displacement",
+    "peak_relative_velocity",
+    "sliding_mode",
+    "validity",
+    "acceleration_ratio",
+]
 """
 
 CASES = """
@@ -140,10 +146,10 @@ def filled(path: Path) -> set[str]:
 
 
 def program(name: str) -> str:
-    found = shutil.which(name)
-    if found is None:
+    path = shutil.which(name)
+    if path is None:
         pytest.skip(f"{name} is not installed")
-    return found
+    return path
 
 
 def test_the_files_hold_what_is_to_be_read(files: Path) -> None:
@@ -205,15 +211,15 @@ def test_history_times_are_seconds(files: Path, name: str) -> None:
 
 def listed(text: str, name: str) -> list[str]:
     """The values of a variable in CDL."""
-    found = re.search(
+    match = re.search(
         rf"^ ?{name} =\s*(.*?) ;", text.partition("\ndata:\n")[2], re.MULTILINE | re.DOTALL
     )
-    assert found is not None, name
-    return found[1].replace(",", " ").split()
+    assert match is not None, name
+    return match[1].replace(",", " ").split()
 
 
 def same(words: list[str], stored: np.ndarray, missing: str = "", fills: bool = False) -> None:
-    """Compare printed values with those stored; `missing` is what a program prints for a fill value, if it `fills`."""
+    """Compare printed values with those stored; `missing` is printed for a fill value."""
     read = np.array([float(word) if word != missing else np.nan for word in words]).astype(
         stored.dtype
         if stored.dtype.kind == "f"

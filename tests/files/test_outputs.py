@@ -52,7 +52,7 @@ def refused(capfd: pytest.CaptureFixture[str], *words: str) -> str:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_what_exists_is_kept(
+def test_an_output_that_exists_is_kept(
     folder: Path, command: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(folder)
@@ -60,10 +60,25 @@ def test_what_exists_is_kept(
     path.write_text("mine")
     assert "exists already; give --overwrite" in refused(capfd, *command.split(), str(path))
     assert path.read_text() == "mine"
-    missing = str(Path("nowhere") / path)
-    assert "the folder nowhere does not exist" in refused(capfd, *command.split(), missing)
-    if os.path.isdir("/proc"):
-        assert f"/proc/{path}" in refused(capfd, *command.split(), f"/proc/{path}")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_an_output_in_a_missing_folder_is_refused(
+    folder: Path, command: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(folder)
+    output = f"nowhere/new{COMMANDS[command]}"
+    assert "the folder nowhere does not exist" in refused(capfd, *command.split(), output)
+
+
+@pytest.mark.skipif(not os.path.isdir("/proc"), reason="has no folder that nobody may write to")
+@pytest.mark.parametrize("command", COMMANDS)
+def test_an_output_in_a_folder_that_nobody_may_write_to_is_refused(
+    folder: Path, command: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(folder)
+    output = f"/proc/new{COMMANDS[command]}"
+    assert output in refused(capfd, *command.split(), output)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="links need rights that users of Windows lack")
@@ -77,9 +92,15 @@ def test_no_command_writes_what_it_reads(
         text = refused(capfd, "run", "a.nc", "-o", output, "--overwrite")
         assert f"{output}: writing it would replace a.nc, which this command reads" in text
     assert Path("a.nc").read_bytes() == before
-    assert "is given twice" in refused(
-        capfd, "chart", "a.nc", "--kind", "contours", "-o", "b.png", "-o", "b.png"
-    )
+
+
+def test_an_output_that_is_given_twice_is_refused(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(folder)
+    chart = ("chart", "a.nc", "--kind", "contours", "-o", "b.png", "-o", "b.png")
+    assert "is given twice" in refused(capfd, *chart)
+    assert not Path("b.png").exists()
 
 
 #: Commands one after the other, in a process of their own.
@@ -90,7 +111,7 @@ print(*[main(line.split()) for line in sys.argv[1:]])
 """
 
 
-def test_where_the_file_system_has_no_locks_the_setting_is_named_that_goes_without(
+def test_without_file_locks_the_message_has_the_setting_that_goes_without(
     folder: Path,
 ) -> None:
     def ended(lines: list[str], **setting: str) -> tuple[str, list[str]]:
@@ -204,16 +225,23 @@ def test_a_file_system_without_a_size_is_not_said_to_be_full() -> None:
         raise OSError(20, "Not a directory")
 
 
-def test_complete_or_absent(tmp_path: Path) -> None:
-    path = tmp_path / "a.txt"
-    with pytest.raises(
-        RunError, match=r"a\.txt: writing failed: No space left on device \(.* free on the disk\)"
-    ):
-        write(path, False, OSError(28, "No space left on device"))
+def test_nothing_is_left_of_an_output_that_could_not_be_written(tmp_path: Path) -> None:
+    message = r"a\.txt: writing failed: No space left on device \(.* free on the disk\)"
+    with pytest.raises(RunError, match=message):
+        write(tmp_path / "a.txt", False, OSError(28, "No space left on device"))
     assert not list(tmp_path.iterdir())
+
+
+def test_an_output_that_another_process_made_meanwhile_is_kept(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
     with pytest.raises(RunError, match="was made by another process during the run"):
         write(path, False, theirs="theirs")
     assert path.read_text() == "theirs"
+
+
+def test_overwriting_replaces_an_output_and_leaves_nothing_beside_it(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    path.write_text("theirs")
     write(path, True)
-    assert [one.name for one in tmp_path.iterdir()] == ["a.txt"]
+    assert [file.name for file in tmp_path.iterdir()] == ["a.txt"]
     assert path.read_text() == "mine"

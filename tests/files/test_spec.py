@@ -40,7 +40,7 @@ def axis(name: str, body: str) -> str:
 
 
 def test_axes_become_arrays_in_the_parameters_own_units() -> None:
-    arguments = spec.parse(GOOD, "a.toml").inputs.given
+    arguments = spec.parse(GOOD, "a.toml").inputs
     np.testing.assert_allclose(arguments["theta"], [0, 5, 10, 15, 20])
     np.testing.assert_allclose(arguments["mu_s"], [0.3, 0.5])
     np.testing.assert_allclose(arguments["amplitude"], np.array([0.1, 0.4, 0.7, 1.0]) * 9.81)
@@ -52,7 +52,7 @@ def test_a_sweep_file_has_pythons_defaults() -> None:
     assert sweep.excitation == Sine(cycles=10, ramp_in=0.0, ramp_out=0.0)
     assert sweep.model == Mendez(rise="monotone", recoupling="eq12", g=9.81)
     assert sweep.solver == Cycle()
-    assert "yield_acceleration" not in sweep.inputs.given
+    assert "yield_acceleration" not in sweep.inputs
     plan = sweep.plan()
     assert plan.sizes == {"theta": 5, "mu_s": 2, "amplitude": 4, "frequency": 3}
     assert list(plan.names) == list(variables.DEFAULT_RESULTS)
@@ -70,18 +70,22 @@ WORDS = {
 
 @pytest.mark.parametrize(("table", "key"), WORDS)
 def test_every_word_reaches_the_sweep(table: str, key: str) -> None:
-    found = []
+    choices = []
     for word in WORDS[table, key]:
         step = 'method = "step"\n' if key == "rule" else ""
         choice = getattr(spec.parse(f'{GOOD}[{table}]\n{step}{key} = "{word}"\n', "a.toml"), table)
         assert word in ("auto", choice.name, getattr(choice, key, None))
-        found.append(choice)
-    assert len(set(found)) == len(WORDS[table, key]) - ("auto" in WORDS[table, key])
+        choices.append(choice)
+    assert len(set(choices)) == len(WORDS[table, key]) - ("auto" in WORDS[table, key])
 
 
 def test_options_reach_the_sweep() -> None:
     text = """
-    model = {rise = "literal", recoupling = "integrate", yield_acceleration = 0.5, structure_frequency = 3, g = 9.8}
+    model.rise = "literal"
+    model.recoupling = "integrate"
+    model.yield_acceleration = 0.5
+    model.structure_frequency = 3
+    model.g = 9.8
     excitation.cycles = 5
     solver = {method = "step", steps_per_cycle = 512, rule = "simpson"}
     output.variables = ["validity"]
@@ -90,13 +94,14 @@ def test_options_reach_the_sweep() -> None:
     assert sweep.model == Mendez(rise="literal", recoupling="integrate", g=9.8)
     assert sweep.excitation == Sine(cycles=5)
     assert sweep.solver == Step(rule="simpson", steps_per_cycle=512)
-    assert (sweep.inputs.yield_acceleration, sweep.inputs.structure_frequency) == (0.5, 3.0)
+    assert sweep.inputs["yield_acceleration"] == 0.5
+    assert sweep.inputs["structure_frequency"] == 3.0
     assert sweep.output.variables == ["validity"]
 
 
 def test_cases_are_zipped_and_crossed_with_the_axes() -> None:
     sweep = spec.parse(CASES, "a.toml")
-    arguments = sweep.inputs.given
+    arguments = sweep.inputs
     assert sweep.plan().sizes == {"mu_s": 3, "frequency": 2, "case": 2}
     assert sweep.labels == ("first", "2")
     for name, values in {"theta": [5, 6], "amplitude": [3, 5]}.items():
@@ -130,12 +135,12 @@ def test_axes_are_converted_to_the_parameters_own_units(
     name: str, units: str, factor: float
 ) -> None:
     text = axis(name, f'values = [0.25, 0.5], units = "{units}"')
-    given = spec.parse(text, "a.toml").inputs.given
-    np.testing.assert_allclose(given[name], np.array([0.25, 0.5]) * factor, rtol=1e-14)
+    inputs = spec.parse(text, "a.toml").inputs
+    np.testing.assert_allclose(inputs[name], np.array([0.25, 0.5]) * factor, rtol=1e-14)
 
 
 def test_g_as_a_unit_is_the_gravity_of_the_model() -> None:
-    arguments = spec.parse(GOOD + "[model]\ng = 1.62\n", "a.toml").inputs.given
+    arguments = spec.parse(GOOD + "[model]\ng = 1.62\n", "a.toml").inputs
     assert arguments["amplitude"][-1] == 1.62
 
 
@@ -177,7 +182,8 @@ BAD = {
     ),
     "waveform": (
         GOOD + '[excitation]\nwaveform = "sawtooth"',
-        "excitation.waveform = 'sawtooth': must be one of 'sine', 'cosine', 'triangle', 'square', 'harmonics'",
+        "excitation.waveform = 'sawtooth': must be one of 'sine', 'cosine', 'triangle', "
+        "'square', 'harmonics'",
     ),
     "variable": (
         GOOD + '[output]\nvariables = ["validty"]',
@@ -311,7 +317,7 @@ def test_the_sweeps_that_come_along_are_good(path: Path) -> None:
 
 
 def test_the_measured_interface_takes_no_estimate_and_holds_the_tests() -> None:
-    """Its two cases, at the amplitude and frequency of their tests, are those of sweeps/paper.toml."""
+    """The cases of sweeps/paper.toml, at the amplitude and frequency of their tests."""
     sweeps = Path(__file__).parents[2] / "sweeps"
     plan = spec.load(sweeps / "interface.toml").plan()
     table = plan.solve()

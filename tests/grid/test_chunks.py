@@ -1,4 +1,4 @@
-"""Grids cut into chunks: how long they are along which dimension, and that they are the whole grid."""
+"""Chunks of a grid: their lengths along each dimension, and that they are the whole grid."""
 
 import numpy as np
 import pytest

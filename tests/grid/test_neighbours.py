@@ -36,7 +36,7 @@ def test_a_dataframe_has_a_row_for_each_cell(result: xr.Dataset) -> None:
 
 
 @pytest.mark.parametrize("chunks", [None, 2])
-def test_functions_of_arrays(result: xr.Dataset, chunks: int | None) -> None:
+def test_numpy_functions_apply_to_results(result: xr.Dataset, chunks: int | None) -> None:
     values = (
         result.permanent_displacement
         if chunks is None
@@ -58,36 +58,38 @@ def test_units_by_pint_xarray(result: xr.Dataset, tmp_path: Path) -> None:
     pytest.importorskip("pint_xarray")
     pytest.importorskip("cf_xarray.units")  # pint reads "m s-2" then
     result.to_netcdf(tmp_path / "a.nc")
-    for one in (result, slipsweep.open_result(tmp_path / "a.nc").load()):
-        found = one.pint.quantify()
-        millimetres = found.pint.to(permanent_displacement="mm").permanent_displacement
+    for dataset in (result, slipsweep.open_result(tmp_path / "a.nc").load()):
+        quantities = dataset.pint.quantify()
+        millimetres = quantities.pint.to(permanent_displacement="mm").permanent_displacement
         np.testing.assert_allclose(
             millimetres.pint.magnitude, 1e3 * result.permanent_displacement, rtol=1e-14
         )
-        in_g = found.amplitude.pint.to("standard_gravity")
-        again = slipsweep.sweep(theta=found.theta, mu_s=found.mu_s, amplitude=in_g, frequency=2.0)
+        in_g = quantities.amplitude.pint.to("standard_gravity")
+        again = slipsweep.sweep(
+            theta=quantities.theta, mu_s=quantities.mu_s, amplitude=in_g, frequency=2.0
+        )
         np.testing.assert_allclose(
             again.permanent_displacement, result.permanent_displacement, rtol=1e-12
         )
-        assert found.pint.dequantify(format="cf").amplitude.attrs["units"] == "m s-2"
+        assert quantities.pint.dequantify(format="cf").amplitude.attrs["units"] == "m s-2"
 
 
 def test_flags_by_cf_xarray(result: xr.Dataset) -> None:
     pytest.importorskip("cf_xarray")
     np.testing.assert_array_equal(result.sliding_mode.cf == "stick_slip", result.sliding_mode == 1)
-    own = slipsweep.flags(result)
+    flags = slipsweep.flags(result)
     for name, flag in result.validity.cf.flags.data_vars.items():
-        np.testing.assert_array_equal(flag, own[name])
+        np.testing.assert_array_equal(flag, flags[name])
     assert "validity" in result.cf["permanent_displacement"].coords
 
 
 def test_flags_without_a_value_come_first_then_cautions_then_notes(result: xr.Dataset) -> None:
-    found = slipsweep.flags(result)
-    kinds = [one.attrs["kind"] for one in found.data_vars.values()]
+    flags = slipsweep.flags(result)
+    kinds = [described.attrs["kind"] for described in flags.data_vars.values()]
     order = ["no value", "caution", "note"]
     assert kinds == sorted(kinds, key=order.index)
     assert {*kinds} == {*order}
-    for name, one in found.data_vars.items():
+    for name, described in flags.data_vars.items():
         flag = slipsweep.Validity[str(name).upper()]
-        assert one.attrs == {"long_name": flag.text, "kind": str(flag.kind)}
-    assert found.equals(result.slipsweep.flags())
+        assert described.attrs == {"long_name": flag.text, "kind": str(flag.kind)}
+    assert flags.equals(result.slipsweep.flags())

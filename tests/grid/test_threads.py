@@ -1,4 +1,4 @@
-"""Threads and processes: the policy of `slipsweep.grid.threads`, under everything that may call a sweep."""
+"""Threads and processes: `slipsweep.grid.threads` under everything that may call a sweep."""
 
 import multiprocessing
 import os
@@ -169,7 +169,7 @@ def test_threads_of_others_compute_on_themselves(expected: np.ndarray) -> None:
             np.testing.assert_array_equal(result, expected)
 
 
-def test_dasks_threads(expected: np.ndarray) -> None:
+def test_dasks_threads_give_the_same_bits(expected: np.ndarray) -> None:
     lazy = slipsweep.sweep(
         **GRID, variables=["permanent_displacement"], chunks={"theta": 7, "mu_s": 13}
     )
@@ -183,8 +183,7 @@ def test_dasks_threads(expected: np.ndarray) -> None:
 )
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 def test_processes_forked_or_not_give_the_same_bits(method: str, expected: np.ndarray) -> None:
-    """Forked after a sweep, too: no thread is left that a child could miss; and kernels that are loaded give the bits
-    of those that were compiled here."""
+    """No thread is left that a child could miss; loaded kernels give the bits of compiled ones."""
     # a process that is not forked takes two seconds to start
     with ProcessPoolExecutor(
         2 if method == "fork" else 1, multiprocessing.get_context(method)

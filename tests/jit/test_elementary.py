@@ -1,4 +1,4 @@
-"""The elementary functions of the kernels, in loops, against mpmath; errors in units in the last place."""
+"""Elementary functions of the kernels, in loops, against mpmath; errors in ulp."""
 
 import math
 from collections.abc import Callable
@@ -22,31 +22,31 @@ def over(function: Callable[..., float], *arguments: Array) -> Array:
     """A function of every element."""
     if len(arguments) == 1:
 
-        def loop(x: Array, found: Array) -> None:
+        def loop(x: Array, results: Array) -> None:
             for i in range(x.size):
-                found[i] = function(x[i])
+                results[i] = function(x[i])
 
         compiled = kernel(loop)
     else:
 
-        def loop_of_two(x: Array, y: Array, found: Array) -> None:
+        def loop_of_two(x: Array, y: Array, results: Array) -> None:
             for i in range(x.size):
-                found[i] = function(x[i], y[i])
+                results[i] = function(x[i], y[i])
 
         compiled = kernel(loop_of_two)
-    found = np.empty_like(arguments[0])
-    compiled(*arguments, found)
-    return found
+    results = np.empty_like(arguments[0])
+    compiled(*arguments, results)
+    return results
 
 
-def worst(found: Array, function: Callable[..., Any], *arguments: Array) -> float:
+def worst(results: Array, function: Callable[..., Any], *arguments: Array) -> float:
     """Largest error, in units in the last place of the true values."""
     errors = []
     with mpmath.workdps(400):
-        for value, *given in zip(
-            found.tolist(), *(argument.tolist() for argument in arguments), strict=True
+        for value, *inputs in zip(
+            results.tolist(), *(argument.tolist() for argument in arguments), strict=True
         ):
-            true = function(*map(mpmath.mpf, given))
+            true = function(*map(mpmath.mpf, inputs))
             errors.append(float(abs(value - true)) / math.ulp(float(true)))
     return max(errors)
 
@@ -81,22 +81,22 @@ FUNCTIONS: dict[str, tuple[Callable[[Any], Any], Array, float]] = {
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_within_its_last_digits(name: str) -> None:
+def test_errors_are_a_few_units_in_the_last_place(name: str) -> None:
     function, places, allowed = FUNCTIONS[name]
     assert worst(over(getattr(elementary, name), places), function, places) <= allowed
 
 
-def test_rising_phase() -> None:
+def test_the_rising_phase_is_accurate_near_the_peak() -> None:
     """As near to the peak as the two differ: there an angle of arccos has no digits."""
     amplitude = np.exp(np.random.default_rng(1).uniform(-20.0, 20.0, 3000))
     below = np.concatenate([spread(0.0, 1.0, 1e-16)[:2999], [0.0]])
     x = amplitude - amplitude * below
-    found = over(elementary.rising_phase, x, amplitude)
-    assert np.all((found >= -HALF_PI) & (found <= 0.0))
-    assert worst(found, lambda x, a: -mpmath.acos(x / a), x, amplitude) <= 3.5
+    phases = over(elementary.rising_phase, x, amplitude)
+    assert np.all((phases >= -HALF_PI) & (phases <= 0.0))
+    assert worst(phases, lambda x, a: -mpmath.acos(x / a), x, amplitude) <= 3.5
 
 
-def test_beyond_their_ranges() -> None:
+def test_arguments_beyond_the_range_give_the_values_at_its_ends() -> None:
     held = over(elementary.exp, np.array([-1e300, -710.0, -708.0, 709.0, 710.0, 1e300]))
     assert held.tolist() == [held[2]] * 3 + [held[3]] * 3
     ends = over(elementary.log, np.array([-math.inf, -1.0, 0.0, 1.0, math.inf]))
@@ -112,7 +112,7 @@ def test_beyond_their_ranges() -> None:
 
 @pytest.mark.parametrize("name", APPROXIMATIONS)
 def test_coefficients_are_those_of_the_script(name: str) -> None:
-    wanted = APPROXIMATIONS[name].coefficients()
+    expected = APPROXIMATIONS[name].coefficients()
     if name == "exp":  # the beginning of the series, exact
-        wanted[0] = 0.5
-    assert list(vars(elementary)[f"_{name.upper()}"]) == wanted
+        expected[0] = 0.5
+    assert list(vars(elementary)[f"_{name.upper()}"]) == expected

@@ -1,4 +1,6 @@
-"""The cycle solver against 30-digit solutions: tables of cases, hard cases, and random cells of every regime."""
+"""The cycle solver against 30-digit solutions: tables of cases, hard cases, and random cells of
+every regime.
+"""
 
 from math import isnan, pi
 from typing import Any
@@ -135,7 +137,9 @@ def test_held_back_cells(regime: str) -> None:
 @strategies.reproducible
 @given(cell=strategies.sliding_cells, cycles=st.sampled_from([1, 2, 3, 17, 1000, 10**6]))
 def test_many_cycles(cell: strategies.Cell, cycles: int) -> None:
-    """A closed form however many cycles: 1e-11 at a million of them; in continuous mode u grows with their square."""
+    """A closed form however many cycles: 1e-11 at a million of them; in continuous mode u grows
+    with their square.
+    """
     assert_is_reference({**cell, "cycles": cycles}, 1e-11, 1e-12 * max(1, cycles) ** 2)
 
 
@@ -144,8 +148,10 @@ def test_many_cycles(cell: strategies.Cell, cycles: int) -> None:
     [(10.15, 0.2, 1.223, 4), (10.15, 0.2, 1.223, 6), (13.22, 0.257, 1.822, 7)],
 )
 def test_pulses_that_lose_speed(theta: float, mu_s: float, amplitude: float, cycles: int) -> None:
-    """At rest the block sticks beyond Üg = Üy; carried on, it slides through ever more slowly, every third or
-    fourth pulse begins again, and W of the cycles repeats."""
+    """At rest the block sticks beyond Üg = Üy; carried on, it slides through ever more slowly.
+
+    Every third or fourth pulse begins again, and W of the cycles repeats.
+    """
     cell: strategies.Cell = {
         "theta": theta,
         "mu_s": mu_s,
@@ -167,7 +173,9 @@ def test_pulses_that_lose_speed(theta: float, mu_s: float, amplitude: float, cyc
     ],
 )
 def test_pulses_that_stop_anew(theta: float, mu_s: float, amplitude: float) -> None:
-    """Carried on, the block stops between t1 and Üg = b and restarts at once, elsewhere in every pulse."""
+    """Carried on, the block stops between t1 and Üg = b and restarts at once, elsewhere in every
+    pulse.
+    """
     cell: strategies.Cell = {"theta": theta, "mu_s": mu_s, "amplitude": amplitude, "frequency": 1.0}
     grown = [
         assert_is_reference({**cell, "cycles": n}, 1e-12, 0.0).permanent_displacement
@@ -177,7 +185,9 @@ def test_pulses_that_stop_anew(theta: float, mu_s: float, amplitude: float) -> N
 
 
 def test_b_is_held_where_eq4_falls_on_the_rise() -> None:
-    """On a steep plane Eq. 4 rises, turns, and falls while the base still rises: b stays at its largest value."""
+    """On a steep plane Eq. 4 rises, turns, and falls while the base still rises: b stays at its
+    largest value.
+    """
     cell: strategies.Cell = {
         "theta": 45.0,
         "mu_s": 1.5,
@@ -210,7 +220,9 @@ def test_pulses_that_stop_anew_as_event_by_event(excitation: Any) -> None:
 @pytest.mark.parametrize("cycles", [1, 10])
 @pytest.mark.parametrize("delta_mu", [0.0, 0.02, 0.3, 6.0])
 def test_peaks_of_continuous_sliding(delta_mu: float, cycles: int) -> None:
-    """Whether the velocity turns on both half cycles, on one or on none; from friction that hardly falls to e^-7."""
+    """Whether the velocity turns on both half cycles, on one or on none; from friction that hardly
+    falls to e^-7.
+    """
     theta = 3.0
     mu_s = 0.3
     amplitude = 1.9 * strategies.G
@@ -248,7 +260,9 @@ def test_sharp_decay(cell: strategies.Cell, exponent: float, options: dict[str, 
 @strategies.reproducible
 @given(cell=strategies.stick_slip() | strategies.newmark(), exponent=st.floats(1.0, 15.0))
 def test_just_above_yield(cell: strategies.Cell, exponent: float) -> None:
-    """A = Uy (1 + e), Uy given: an ulp of A moves u by 2 ulp / e, and no error is a hundred times that."""
+    """A = Uy (1 + e), Uy given: an ulp of A moves u by 2 ulp / e, and no error is a hundred times
+    that.
+    """
     onset = cell["amplitude"]
     amplitude = onset * (1 + 10**-exponent)
     excess = (amplitude - onset) / onset

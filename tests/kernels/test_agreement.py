@@ -1,4 +1,6 @@
-"""The cycle solver, the step solver, `simulate` and the reference agree, whatever options, waveform and cell."""
+"""The cycle solver, the step solver, `simulate` and the reference agree, whatever options, waveform
+and cell.
+"""
 
 from collections import Counter
 

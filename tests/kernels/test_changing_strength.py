@@ -1,4 +1,6 @@
-"""Newmark's block whose strength falls with slip or depends on velocity: SciPy, closed forms, limits."""
+"""Newmark's block whose strength falls with slip or depends on velocity: SciPy, closed forms,
+limits.
+"""
 
 from math import acosh, asin, atan, cos, cosh, inf, pi, radians, sin, sinh, tan
 from typing import Any

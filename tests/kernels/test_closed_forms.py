@@ -25,7 +25,9 @@ OBJECTS: dict[str, Any] = {"sine": Sine, "square": Square, "triangle": Triangle}
 
 
 def integrated(wave: str, r: float) -> float:
-    """u/(A T²) of one cycle, by SciPy: from the onset on, part by part, to the first zero of the velocity."""
+    """u/(A T²) of one cycle, by SciPy: from the onset on, part by part, to the first zero of the
+    velocity.
+    """
     w, ends = WAVES[wave]
     onset = {"sine": np.arcsin(r) / (2.0 * np.pi), "square": 0.0, "triangle": r / 4.0}[wave]
 

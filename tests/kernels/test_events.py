@@ -9,7 +9,7 @@ import pytest
 import slipsweep
 from slipsweep import RunError
 from slipsweep.grid import solvers
-from slipsweep.kernels import events, step
+from slipsweep.kernels import roots, step_cells
 from slipsweep.kernels.block import UNSOLVED
 
 
@@ -19,7 +19,7 @@ def _power(where: tuple[float, float], x: float) -> tuple[float, float]:
     return math.copysign(abs(x - root) ** power, x - root), power * abs(x - root) ** (power - 1.0)
 
 
-_root_of_power = events.root_of(_power)
+_root_of_power = roots.root_of(_power)
 
 
 @numba.njit  # type: ignore[untyped-decorator]
@@ -63,7 +63,7 @@ def test_a_cell_that_is_not_solved_ends_the_run_and_is_named(
     options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(solvers, "solve_walk", failing)
-    monkeypatch.setattr(step, "solve_steps", failing)
+    monkeypatch.setattr(step_cells, "solve_steps", failing)
     axes: dict[str, Any] = {
         "theta": [0.0, 5.0],
         "mu_s": 0.3,

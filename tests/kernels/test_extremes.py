@@ -1,4 +1,6 @@
-"""Numbers at the ends of their ranges: served, or refused by name; never infinite, missing unsaid, or a warning."""
+"""Numbers at the ends of their ranges: served, or refused by name; never infinite, missing unsaid,
+or a warning.
+"""
 
 import math
 import random

@@ -1,4 +1,6 @@
-"""Flags at their borders; others are in test_properties, test_accuracy and, of records, in test_record."""
+"""Flags at their borders; others are in test_properties, test_accuracy and, of records, in
+test_record.
+"""
 
 import math
 from typing import Any
@@ -63,7 +65,9 @@ def test_flags_of_a_value_need_one_and_friction_parameters_have_those_before_the
 
 @pytest.mark.parametrize("solver", ["cycle", "step"])
 def test_a_ramp_that_ends_too_soon_moves_no_block_and_raises_no_flag(solver: str) -> None:
-    """Between two ramps the shaking stays below the yield acceleration; the mode goes by the peak without them."""
+    """Between two ramps the shaking stays below the yield acceleration; the mode goes by the peak
+    without them.
+    """
     found = slipsweep.sweep(
         5.0, 0.4, [3.2, 4.5], 1.0, excitation=slipsweep.Sine(1, 0.5, 0.5), solver=solver
     )

@@ -1,4 +1,6 @@
-"""Hard records (docs/hard-cases.md): the error of Newmark's block against what one ulp of the inputs does."""
+"""Hard records (docs/hard-cases.md): the error of Newmark's block against what one ulp of the
+inputs does.
+"""
 
 import numpy as np
 import pytest
@@ -51,7 +53,9 @@ def test_newmark_within_100_times_the_conditioning(category: Category) -> None:
 
 
 def test_a_million_samples() -> None:
-    """A quarter of a million equal pulses, each of which comes to rest: u is that of one, times their number."""
+    """A quarter of a million equal pulses, each of which comes to rest: u is that of one, times
+    their number.
+    """
     pulse = np.array([0.0, 1.0, 0.0, -1.0])
     exact, bound, _ = conditioning(Cell(np.append(pulse, 0.0), 0.3, interval=0.007))
     displacement, velocity, slips = solved(

@@ -1,4 +1,6 @@
-"""Newmark's block under a sine: against pySLAMMER, its closed form to the last digits, and what reduces to it."""
+"""Newmark's block under a sine: against pySLAMMER, its closed form to the last digits, and what
+reduces to it.
+"""
 
 from math import atan, radians, tan
 from typing import Any
@@ -23,7 +25,9 @@ G = 9.81
 def test_newmark_against_pyslammer(
     theta: float, mu_s: float, amplitude: float, frequency: float, cycles: int
 ) -> None:
-    """pySLAMMER takes the trapezoidal rule from sample to sample, onset and stop at the samples: second order.
+    """pySLAMMER takes the trapezoidal rule from sample to sample: of second order.
+
+    Onset and stop are at samples there.
 
     At 256 samples a cycle it is seen to err by up to 4e-4 in these cells, so that 16384
     samples must agree to 5e-7, with a margin of 5 on the order.
@@ -49,7 +53,9 @@ def test_newmark_against_pyslammer(
 
 
 def test_newmark_to_the_last_digits() -> None:
-    """Every share of yield in the peak, down to what a double can hold and up to one unit below the peak."""
+    """Every share of yield in the peak, down to what a double can hold and up to one unit below the
+    peak.
+    """
     random = np.random.default_rng(11)
     amplitude = 3.7
     cycles = 7
@@ -78,7 +84,9 @@ def test_newmark_to_the_last_digits() -> None:
 @pytest.mark.parametrize("solver", ["cycle", "step"])
 @pytest.mark.parametrize("recoupling", ["eq12", "integrate"])
 def test_mendez_reduces_to_newmark_just_above_yield(solver: str, recoupling: str) -> None:
-    """Near yield Eq. 4 stays below Coulomb's value: b = Uy, and the pulse is over before Ug reverses."""
+    """Near yield Eq. 4 stays below Coulomb's value: b = Uy, and the pulse is over before Ug
+    reverses.
+    """
     theta = xr.DataArray([0.0, 5.0, 10.0, 20.0], dims="case")
     mu_s = xr.DataArray([0.3, 0.38, 0.4, 0.75], dims="case")
     onset = slipsweep.friction_parameters(theta, mu_s, 1.0).yield_acceleration.drop_vars(

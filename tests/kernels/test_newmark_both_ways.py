@@ -180,7 +180,9 @@ def test_agreement_with_steps(motion: Any) -> None:
 
 
 def test_a_slide_upslope_that_ends_where_it_begins() -> None:
-    """|Üg| falls through Üy,up just where the block turns; rounding sent the search for the stop astray."""
+    """|Üg| falls through Üy,up just where the block turns; rounding sent the search for the stop
+    astray.
+    """
     block: dict[str, Any] = {
         "theta": 3.0,
         "mu_s": 0.3,

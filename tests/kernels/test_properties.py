@@ -1,4 +1,6 @@
-"""What must hold for every block: scaling, signs, order, symmetry, and indifference to how a sweep is written."""
+"""What must hold for every block: scaling, signs, order, symmetry, and indifference to how a sweep
+is written.
+"""
 
 from math import isclose, isnan, radians, tan
 from typing import Any
@@ -46,7 +48,9 @@ def assert_same(one: xr.Dataset, other: xr.Dataset) -> None:
 def test_scaling_law_is_exact_for_powers_of_two(
     solver: str, cell: strategies.Cell, power: int
 ) -> None:
-    """u goes with f^-2 and v with f^-1: a power of two changes no digit; one of an axis is that one by itself."""
+    """u goes with f^-2 and v with f^-1: a power of two changes no digit; one of an axis is that one
+    by itself.
+    """
     cell = {**cell, "solver": solver, "steps_per_cycle": COARSE}
     one = respond(cell)
     other = respond(cell, frequency=cell["frequency"] * 2.0**power)
@@ -77,7 +81,9 @@ def test_no_slip_at_or_below_yield(solver: str, cell: strategies.Cell, model: st
 @strategies.reproducible
 @given(cell=strategies.stick_slip() | strategies.newmark())
 def test_one_ulp_above_yield_slips_hardly(solver: str, cell: strategies.Cell) -> None:
-    """A = Uy sticks; the next double above it slides, by nothing that a double of size A/omega^2 could show."""
+    """A = Uy sticks; the next double above it slides, by nothing that a double of size A/omega^2
+    could show.
+    """
     onset = cell["amplitude"]
     cell = {**cell, "yield_acceleration": onset, "solver": solver}
     above = float(np.nextafter(onset, np.inf))
@@ -94,7 +100,9 @@ def test_one_ulp_above_yield_slips_hardly(solver: str, cell: strategies.Cell) ->
 @strategies.reproducible
 @given(cell=strategies.stick_slip() | strategies.newmark(), options=strategies.model_options)
 def test_cycles_add_up(solver: str, cell: strategies.Cell, options: dict[str, str]) -> None:
-    """In stick-slip no cycle moves the block upslope; where each pulse ends at rest, N cycles are N times one."""
+    """In stick-slip no cycle moves the block upslope; where each pulse ends at rest, N cycles are N
+    times one.
+    """
     cell = {**cell, **options, "solver": solver, "steps_per_cycle": COARSE}
     one, some, more = (
         respond(cell, cycles=cycles) for cycles in (1, cell["cycles"], cell["cycles"] + 1)
@@ -111,7 +119,9 @@ def test_cycles_add_up(solver: str, cell: strategies.Cell, options: dict[str, st
 
 
 def test_run_out_may_exceed_another_cycle() -> None:
-    """The exception: where Kd is tiny the run-out under Eq. 12 is longer than what the next pulse lets it be."""
+    """The exception: where Kd is tiny the run-out under Eq. 12 is longer than what the next pulse
+    lets it be.
+    """
     cell: strategies.Cell = {"theta": 0.0, "mu_s": 0.75, "amplitude": 2.8, "frequency": 1.0}
     cell |= {"yield_acceleration": 0.025, "decay_rate": 20.0, "delta_mu": 0.1}
     one = respond(cell, cycles=1)
@@ -187,7 +197,9 @@ def near_a_limit(cell: strategies.Cell) -> bool:
 @settings(strategies.reproducible, max_examples=150)
 @given(cell=strategies.anything())
 def test_validity_says_why(solver: str, cell: strategies.Cell) -> None:
-    """Each bit is set where, and only where, its condition holds; NaN and mode -1 with the valueless ones."""
+    """Each bit is set where, and only where, its condition holds; NaN and mode -1 with the
+    valueless ones.
+    """
     assume(not near_a_limit(cell))
     expected = reference.solve(**cell)
     result = respond(cell, solver=solver, steps_per_cycle=FINE)

@@ -1,4 +1,6 @@
-"""Recorded motions: against closed forms, independent programs, the sine's own solver, and by their symmetries."""
+"""Recorded motions: against closed forms, independent programs, the sine's own solver, and by their
+symmetries.
+"""
 
 from math import pi, radians, tan
 from typing import Any
@@ -98,7 +100,9 @@ def _exact(decay: float, x: float, change: float) -> tuple[mpfr, mpfr]:
     ],
 )
 def test_integrals_of_eq4_on_a_linear_piece(decay: float, x: float, change: float) -> None:
-    """From no decay to a friction that lives in a thousandth of the piece, rising and falling, on both sides."""
+    """From no decay to a friction that lives in a thousandth of the piece, rising and falling, on
+    both sides.
+    """
     for gain, exact in zip(_follow(decay, x, change), _exact(decay, x, change), strict=True):
         assert gain == pytest.approx(float(exact), rel=5e-15, abs=5e-15 * G)
 
@@ -111,7 +115,7 @@ def test_integrals_of_eq4_on_a_linear_piece(decay: float, x: float, change: floa
     "name", ["Northridge_1994_PAC-175", "Cape_Mendocino_1992_PET-090", "Duzce_1999_375-090"]
 )
 def test_newmark_against_pyslammer_on_its_ground_motions(name: str) -> None:
-    """pySLAMMER finds onset and stop at samples: refining the same straight lines, it comes to this answer.
+    """pySLAMMER finds onset and stop at samples: with finer samples it comes to this answer.
 
     Its error falls with the step, and as the square of it where its tolerance of 1e-5 m/s on the
     stop does not show.
@@ -200,7 +204,9 @@ def test_mendez_on_recorded_motions(
 
 
 def test_a_rise_beyond_a_turn_of_eq4_comes_to_an_end() -> None:
-    """A pulse of an earthquake in which the part from a turn of Eq. 4 on ended, by rounding, at that turn."""
+    """A pulse of an earthquake in which the part from a turn of Eq. 4 on ended, by rounding, at
+    that turn.
+    """
     values = (
         -0.97,
         0.0313594111705,
@@ -223,7 +229,7 @@ def test_a_rise_beyond_a_turn_of_eq4_comes_to_an_end() -> None:
 
 @pytest.mark.parametrize("recoupling", ["eq12", "integrate"])
 def test_a_block_that_stops_on_a_plateau_slides_again_at_once(recoupling: str) -> None:
-    """Held at what the peak before gave, b is above the plateau; at rest there it is below it: c of the plateau.
+    """Held from the peak before, b is above the plateau; at rest there it is c, below it.
 
     On the rise that follows b goes on from c, not from what it was on the rise to the plateau.
     """
@@ -283,7 +289,9 @@ def test_zero_over_an_interval_ends_continuous_sliding() -> None:
 
 @pytest.mark.parametrize("seed", range(0, 200, 50))
 def test_mendez_on_made_up_records(seed: int) -> None:
-    """Plateaus, zeros touched, records that begin and end anywhere, all options; ``benchmarks.agreement`` has more."""
+    """Plateaus, zeros touched, records that begin and end anywhere, all options;
+    ``benchmarks.agreement`` has more.
+    """
     apart = {one: difference(made(one)) for one in range(seed, seed + 50)}
     assert max(apart.values()) < SEEN, max(apart, key=lambda one: apart[one])
 
@@ -333,7 +341,9 @@ def test_finely_sampled_sine(
 def test_a_triangle_is_its_own_record(
     options: dict[str, Any], cell: tuple[float, float, float, float]
 ) -> None:
-    """A wave of straight lines is a record of its corners: two ways through other pieces to one answer."""
+    """A wave of straight lines is a record of its corners: two ways through other pieces to one
+    answer.
+    """
     theta, mu_s, amplitude, frequency = cell
     wave = slipsweep.sweep(
         theta, mu_s, amplitude, frequency, **choices(cycles=3, waveform="triangle", **options)
@@ -347,7 +357,9 @@ def test_a_triangle_is_its_own_record(
 
 
 def test_modes_alternate_between_pulses() -> None:
-    """A pulse in each mode and one below yield, at rest between them: the sum of what each does alone."""
+    """A pulse in each mode and one below yield, at rest between them: the sum of what each does
+    alone.
+    """
     theta = 5.0
     mu_s = 0.4
     limit = float(slipsweep.friction_parameters(theta, mu_s, 5.0).limiting_acceleration)
@@ -402,7 +414,9 @@ def test_time_scale_and_polarity(shaking: Record, options: dict[str, Any]) -> No
 
 @pytest.mark.parametrize("step", [0.0, 0.25])
 def test_a_sweep_is_what_a_history_ends_with(shaking: Record, step: float) -> None:
-    """A history goes by the general rules through all pulses, a sweep by one loop through most; steps make plateaus."""
+    """A history goes by the general rules through all pulses, a sweep by one loop through most;
+    steps make plateaus.
+    """
     rng = np.random.default_rng(3)
     record = (
         Record(shaking.times, np.round(shaking.acceleration / step) * step) if step else shaking
@@ -432,7 +446,9 @@ def test_a_sweep_is_what_a_history_ends_with(shaking: Record, step: float) -> No
 def test_amplitude_is_the_peak_that_the_record_is_scaled_to(
     shaking: Record, options: dict[str, Any]
 ) -> None:
-    """The same bits as under the scale, amplitude over the record's own peak, whichever sign that has."""
+    """The same bits as under the scale, amplitude over the record's own peak, whichever sign that
+    has.
+    """
     amplitude = np.array([0.5, 2.0, 4.5])
     for record in (shaking, Record(shaking.times, -2.5 * shaking.acceleration)):
         peak = np.abs(record.acceleration).max()
@@ -524,7 +540,9 @@ def test_samples_added_on_the_lines_change_nothing(
 
 
 def test_mendez_held_at_yield_is_newmark(shaking: Record) -> None:
-    """Where Eq. 4 asks for nothing above Üy and recoupling is integrated, the two models are one block."""
+    """Where Eq. 4 asks for nothing above Üy and recoupling is integrated, the two models are one
+    block.
+    """
     theta = 5.0
     mu_s = 0.5
     onset = float(slipsweep.friction_parameters(theta, mu_s, 1.0).yield_acceleration)
@@ -540,7 +558,9 @@ def test_mendez_held_at_yield_is_newmark(shaking: Record) -> None:
 
 
 def test_only_an_acceleration_up_the_slope_lifts_the_block() -> None:
-    """n = g + Üg tan θ ≤ 0: a peak beyond g / tan θ in the other direction has a value, that of the reference."""
+    """n = g + Üg tan θ ≤ 0: a peak beyond g / tan θ in the other direction has a value, that of the
+    reference.
+    """
     record = Record.sampled([0.0, 0.0, 30.0, 0.0], 0.05)
     cell = {"theta": 20.0, "mu_s": 0.6}
     assert assert_is_reference(record, cell).continuous_pulses == 1

@@ -1,4 +1,6 @@
-"""The multiple-precision reference against cases.csv, which was made elsewhere, closed forms, and its own table."""
+"""The multiple-precision reference against cases.csv, which was made elsewhere, closed forms, and
+its own table.
+"""
 
 import random
 from math import radians, tan
@@ -19,7 +21,9 @@ CASES = read_cases()
 
 @pytest.mark.parametrize("category", sorted({case.category for case in CASES}))
 def test_motion_as_in_cases_csv(category: str) -> None:
-    """cases.csv was made with the decimal g = 9.81; one line of it lies beyond uplift, and has a value all the same."""
+    """cases.csv was made with the decimal g = 9.81; one line of it lies beyond uplift, and has a
+    value all the same.
+    """
     for case in (case for case in CASES if case.category == category):
         solution = reference.solve(**case.arguments | {"g": "9.81"})
         if case.uplift:
@@ -47,7 +51,9 @@ def test_motion_as_in_cases_csv(category: str) -> None:
 
 
 def test_continuous_velocity_is_that_of_bessel_and_struve_functions() -> None:
-    """Over whole cycles v grows by 2 tan(theta) times the integral of |Ug| (mu_s - tan(theta) - mu)."""
+    """Over whole cycles v grows by 2 tan(theta) times the integral of |Ug| (mu_s - tan(theta) -
+    mu).
+    """
     theta = 6
     mu_s = "0.38"
     amplitude = "5.1"

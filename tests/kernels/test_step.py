@@ -1,4 +1,6 @@
-"""The stepping kernel: orders and errors against 30 digits, hard cases, Eq. 12 by hand, records, histories."""
+"""The stepping kernel: orders and errors against 30 digits, hard cases, Eq. 12 by hand, records,
+histories.
+"""
 
 from collections.abc import Iterable, Sequence
 from math import asin, cos, isfinite, pi, sin, sqrt
@@ -67,7 +69,9 @@ def errors_of(cases: Sequence[Case], rule: str, counts: Sequence[int]) -> np.nda
 
 @pytest.mark.parametrize("rule", ["trapezoid", "simpson"])
 def test_every_case(rule: str) -> None:
-    """8192 steps a cycle: 2e-3 |u| + 1e-12 A/omega^2, hard cases included; the step squared where all is smooth."""
+    """8192 steps a cycle: 2e-3 |u| + 1e-12 A/omega^2, hard cases included; the step squared where
+    all is smooth.
+    """
     found = solve_cases(CASES, rule, 8192)
     for case in CASES:
         wrong = case.missed(
@@ -77,7 +81,9 @@ def test_every_case(rule: str) -> None:
 
 
 def test_rectangle_errs_by_steps_of_the_pulse() -> None:
-    """First order: relative error at most twice the step over the pulse's own length, W/V of the case."""
+    """First order: relative error at most twice the step over the pulse's own length, W/V of the
+    case.
+    """
     found = solve_cases(CASES, "rectangle", 8192)
     for case in CASES:
         exact = float(case.permanent_displacement)
@@ -114,7 +120,9 @@ WAVEFORMS = sorted({case.waveform for case in WAVE_CASES})
 @EVERY_RULE
 @pytest.mark.parametrize("waveform", WAVEFORMS)
 def test_order_of_every_waveform(waveform: str, rule: str) -> None:
-    """Across jumps and kinks, in all regimes: the median case gains by the order, each by the first at least."""
+    """Across jumps and kinks, in all regimes: the median case gains by the order, each by the first
+    at least.
+    """
     sharp = ("sharp_decay", "just_above_yield")
     cases = [
         c
@@ -210,7 +218,9 @@ def test_hard_cases_converge_at_first_order(rule: str) -> None:
 
 @EVERY_RULE
 def test_square_wave_under_newmark(rule: str) -> None:
-    """Rate (A − Üy) for π, then −(A + Üy) to the stop: constant, so that every rule is exact with any step."""
+    """Rate (A − Üy) for π, then −(A + Üy) to the stop: constant, so that every rule is exact with
+    any step.
+    """
     exact = 3 * (pi**2 / 2 + pi**2 / (2 * 3))
     for steps in (8, 1000):
         block: dict[str, Any] = {
@@ -225,7 +235,9 @@ def test_square_wave_under_newmark(rule: str) -> None:
 
 @pytest.mark.parametrize("rule", ["trapezoid", "simpson"])
 def test_triangle_wave_under_newmark(rule: str) -> None:
-    """From t1 on the rate rises for L = π/4 with s = 2A/π, falls as fast, and V is 0 √2 L after the rate was."""
+    """From t1 on the rate rises for L = π/4 with s = 2A/π, falls as fast, and V is 0 √2 L after the
+    rate was.
+    """
     exact = 3 * (4 / pi) * (pi / 4) ** 3 * (1 + 2 * sqrt(2) / 3)
     block: dict[str, Any] = {"theta": 0.0, "mu_s": 0.1, "amplitude": 2.0, "yield_acceleration": 1.0}
     found = scaled_displacements(Triangle(cycles=3), rule, 8, model="newmark", **block)
@@ -248,7 +260,9 @@ def test_a_slide_that_begins_at_the_end_of_a_piece(rule: str, steps: int) -> Non
 
 
 def test_eq12_by_hand() -> None:
-    """Newmark's slide up to t5 in closed form, then V/b more: v − b t (monotone rise that the yield value governs)."""
+    """Newmark's slide up to t5 in closed form, then V/b more: v − b t (monotone rise that the yield
+    value governs).
+    """
     amplitude = 3.0
     least = 1.0
     mu_s = 0.5

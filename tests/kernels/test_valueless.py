@@ -1,4 +1,6 @@
-"""A cell without a value has none in any result: NaN, mode -1, and so in every solver, a record and a history."""
+"""A cell without a value has none in any result: NaN, mode -1, and so in every solver, a record and
+a history.
+"""
 
 from typing import Any
 
@@ -93,7 +95,9 @@ def test_record_gives_no_value(flag: Validity) -> None:
 
 @pytest.mark.parametrize("wave", WAVES, ids=str)
 def test_grids_of_literal_rises(wave: dict[str, Any]) -> None:
-    """Where Eq. 12 has nothing to brake with, beside cells that have a value: one mask for all results."""
+    """Where Eq. 12 has nothing to brake with, beside cells that have a value: one mask for all
+    results.
+    """
     axes: dict[str, Any] = {
         "theta": np.linspace(0.0, 20.0, 7),
         "mu_s": np.linspace(0.2, 1.0, 7),
@@ -111,7 +115,9 @@ def test_grids_of_literal_rises(wave: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("solver", SOLVERS, ids=str)
 def test_a_shaking_that_ends_in_a_rise_leaves_nothing_to_brake_with(solver: dict[str, Any]) -> None:
-    """The ramp keeps the first rise below yield: the last one, up to the end of the shaking, is the only one."""
+    """The ramp keeps the first rise below yield: the last one, up to the end of the shaking, is the
+    only one.
+    """
     cell = {
         "theta": 0.0,
         "mu_s": 0.337,

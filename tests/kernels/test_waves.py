@@ -1,4 +1,6 @@
-"""Waveforms against closed forms, and what must hold between them and over cycles, frequencies and ramps."""
+"""Waveforms against closed forms, and what must hold between them and over cycles, frequencies and
+ramps.
+"""
 
 from math import acos, pi, radians, sin, tan
 from typing import Any
@@ -51,7 +53,9 @@ def displacement(**given: Any) -> float:
 @reproducible
 @given(share=st.floats(0.01, 0.999), theta=st.floats(0, 15), cycles=st.integers(1, 10**6))
 def test_newmark_under_a_cosine(share: float, theta: float, cycles: int) -> None:
-    """From the first peak to the stop, pulses of the sine, and from Üy to the last peak, where Eq. 12 begins."""
+    """From the first peak to the stop, pulses of the sine, and from Üy to the last peak, where Eq.
+    12 begins.
+    """
     amplitude = 4.0
     onset = share * 4.0
     stop = brentq(lambda psi: amplitude * sin(psi) - onset * psi, 1e-3, pi, xtol=1e-15)
@@ -87,7 +91,9 @@ def test_newmark_under_a_cosine(share: float, theta: float, cycles: int) -> None
 def test_continuous_sliding_under_a_cosine(
     theta: float, mu_s: float, delta_mu: float, decay_rate: float, cycles: int
 ) -> None:
-    """From a peak on N cycles give W = π N² γ, and γ, what V gains over a cycle, is 4 A tan θ (μs − tan θ − μ₀ q₁)."""
+    """From a peak on N cycles give W = π N² γ, and γ, what V gains over a cycle, is 4 A tan θ (μs −
+    tan θ − μ₀ q₁).
+    """
     k = decay_rate * 12.0 / 9.81
     q1 = 1 + pi / 2 * (modstruve(1, k) - iv(1, k))
     gain = 4 * 12.0 * tan(radians(theta)) * (mu_s - tan(radians(theta)) - (mu_s + delta_mu) * q1)
@@ -112,7 +118,9 @@ def test_continuous_sliding_under_a_cosine(
 @pytest.mark.parametrize("cell", ["coulomb", "measured", "newmark"])
 @pytest.mark.parametrize("recoupling", ["eq12", "integrate"])
 def test_parts_of_a_cosine_are_those_of_its_history(cell: str, recoupling: str) -> None:
-    """Half a pulse from the first peak, whole ones, and the rise to the last peak with what follows the shaking."""
+    """Half a pulse from the first peak, whole ones, and the rise to the last peak with what follows
+    the shaking.
+    """
     options = {**CELLS[cell], "waveform": "cosine", "frequency": 1.0, "recoupling": recoupling}
     # at Üg = 0 on the rise the block is at rest
     history = slipsweep.simulate(
@@ -161,7 +169,9 @@ def test_peak_below_zero_decides_the_mode_alone() -> None:
 @every_whole_wave
 @pytest.mark.parametrize("cell", CELLS)
 def test_a_million_cycles(wave: str, cell: str) -> None:
-    """u grows with the cycles as a line (rest in each) or a parabola (velocity carried on): read off three of them."""
+    """u grows with the cycles as a line (rest in each) or a parabola (velocity carried on): read
+    off three of them.
+    """
     options = {**CELLS[cell], **WAVES[wave]}
     counts = np.array([40, 41, 42])
     few = np.array([displacement(**options, cycles=int(n)) for n in counts])
@@ -238,7 +248,9 @@ def test_a_grid_is_its_cells() -> None:
 
 
 def test_a_block_outlasts_an_interval_that_begins_no_pulse() -> None:
-    """It comes to rest behind one below Üy, where in a later cycle a ramp has begun: that pulse is another."""
+    """It comes to rest behind one below Üy, where in a later cycle a ramp has begun: that pulse is
+    another.
+    """
     terms = ([0.4483889281248371, 0.3964501428370584], [1, 4], [11.025413290195758, 270.0])
     cell: dict[str, Any] = {
         "theta": 3.4,

@@ -53,16 +53,16 @@ each = pytest.mark.parametrize(
 
 def test_every_choice_is_here() -> None:
     assert {type(choice) for _, choice in CHOSEN} == {
-        one for family in FAMILIES.values() for one in family.choices
+        each for family in FAMILIES.values() for each in family.choices
     }
 
 
 @each
 def test_choices_are_frozen_and_come_back_from_their_repr(keyword: str, choice: Choice) -> None:
     """Frozen, comparable, hashable, picklable; the repr makes it again."""
-    for one in declared(type(choice)):
+    for option in declared(type(choice)):
         with pytest.raises(dataclasses.FrozenInstanceError):
-            setattr(choice, one.name, one.default)
+            setattr(choice, option.name, option.default)
     for again in (pickle.loads(pickle.dumps(choice)), eval(repr(choice), vars(slipsweep))):
         assert again == choice
         assert hash(again) == hash(choice)
@@ -75,7 +75,8 @@ def test_choices_are_frozen_and_come_back_from_their_repr(keyword: str, choice: 
 def test_equal_however_the_numbers_are_given() -> None:
     assert Sine(cycles=3.0) == Sine(3)  # type: ignore[arg-type]
     assert repr(Sine(3, ramp_in=1)) == "Sine(cycles=3, ramp_in=1.0, ramp_out=0.0)"
-    assert Harmonics((1, 0.5), (1, 2)) == Harmonics([1.0, 0.5], [1.0, 2.0], [0, 0])  # type: ignore[list-item]
+    lists: Any = ([1.0, 0.5], [1.0, 2.0], [0, 0])
+    assert Harmonics((1, 0.5), (1, 2)) == Harmonics(*lists)
 
 
 def test_a_name_is_the_choice_with_its_defaults() -> None:

@@ -1,4 +1,4 @@
-"""Arguments of the public functions: what is no value, and what cannot stand in a dataset, is refused by name."""
+"""Arguments of the public functions: values that are not allowed are refused by their names."""
 
 from collections.abc import Callable
 from decimal import Decimal
@@ -45,7 +45,7 @@ def call(function: str, **changed: Any) -> xr.Dataset:
 
 
 @pytest.mark.parametrize("function", FUNCTIONS)
-def test_what_has_to_be_given_is_given(function: str) -> None:
+def test_a_missing_parameter_is_named(function: str) -> None:
     for name in FUNCTIONS[function][1]:
         if name == "samples":
             continue
@@ -80,13 +80,13 @@ def test_stacked_coordinates_come_apart() -> None:
     grid = xr.Dataset(coords={"mu_s": ("mu_s", [0.3, 0.4]), "site": ("site", ["a", "b", "c"])})
     grid["theta"] = grid.mu_s * 0.0 + xr.DataArray([0.0, 5.0, 8.0], dims="site")
     cases = grid.stack(case=("mu_s", "site"))
-    found = call("sweep", theta=cases.theta, mu_s=cases.mu_s)
-    assert found.permanent_displacement.dims == ("case",)
-    assert found.site.values.tolist() == ["a", "b", "c"] * 2
-    np.testing.assert_array_equal(found.mu_s, np.repeat([0.3, 0.4], 3))
+    result = call("sweep", theta=cases.theta, mu_s=cases.mu_s)
+    assert result.permanent_displacement.dims == ("case",)
+    assert result.site.values.tolist() == ["a", "b", "c"] * 2
+    np.testing.assert_array_equal(result.mu_s, np.repeat([0.3, 0.4], 3))
     crossed = call("sweep", theta=grid.theta, mu_s=grid.mu_s).permanent_displacement
     np.testing.assert_array_equal(
-        found.permanent_displacement, crossed.transpose("mu_s", "site").values.ravel()
+        result.permanent_displacement, crossed.transpose("mu_s", "site").values.ravel()
     )
 
 
@@ -171,7 +171,7 @@ def test_long_values_are_cut_short() -> None:
 @pytest.mark.parametrize(
     "number", [np.float32(0.5), np.array(0.5), Decimal("0.5"), Fraction(1, 2), xr.DataArray(0.5)]
 )
-def test_numbers_of_other_types(number: Any) -> None:
+def test_numbers_of_other_types_are_accepted(number: Any) -> None:
     assert slipsweep.Sine(ramp_in=number) == slipsweep.Sine(ramp_in=0.5)
     for function, name in [
         ("sample", "thresholds"),
@@ -207,27 +207,38 @@ def test_friction_angles_that_are_none(phi: Any) -> None:
         call("sweep", mu_s=0.3, phi=20.0)
 
 
-def test_what_brings_a_unit_is_converted() -> None:
-    unit: Any = pint.UnitRegistry()
-    for name, given, expected in (
-        ("amplitude", 0.3 * unit.standard_gravity, 0.3 * 9.80665),
-        ("amplitude", unit.Quantity([10.0, 20.0], "cm/s**2"), [0.1, 0.2]),
+UNITS: Any = pint.UnitRegistry()
+
+
+@pytest.mark.parametrize(
+    ("name", "argument", "expected"),
+    [
+        ("amplitude", 0.3 * UNITS.standard_gravity, 0.3 * 9.80665),
+        ("amplitude", UNITS.Quantity([10.0, 20.0], "cm/s**2"), [0.1, 0.2]),
         ("amplitude", xr.DataArray([0.1, 0.2], dims="x", attrs={"units": "g"}), [0.981, 1.962]),
         ("amplitude", xr.Variable("x", [1.0], {"units": "m s-2"}), [1.0]),
-        ("theta", 0.1 * unit.radian, np.degrees(0.1)),
-        ("frequency", 120.0 * unit.rpm, 2.0),
-        ("displacement", 50.0 * unit.mm, 0.05),
-    ):
-        np.testing.assert_allclose(check_values(name, given), expected, rtol=1e-14)
-    for name, given in (
-        ("amplitude", 3.0 * unit.gram),
+        ("theta", 0.1 * UNITS.radian, np.degrees(0.1)),
+        ("frequency", 120.0 * UNITS.rpm, 2.0),
+        ("displacement", 50.0 * UNITS.mm, 0.05),
+    ],
+)
+def test_an_argument_with_a_unit_is_converted(name: str, argument: Any, expected: Any) -> None:
+    np.testing.assert_allclose(check_values(name, argument), expected, rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("name", "argument"),
+    [
+        ("amplitude", 3.0 * UNITS.gram),
         ("mu_s", xr.DataArray(30.0, attrs={"units": "%"})),
-    ):
-        with pytest.raises(InputError, match=f"{name}: units = .* must be a unit that converts to"):
-            check_values(name, given)
+    ],
+)
+def test_an_argument_with_a_unit_of_another_quantity_is_refused(name: str, argument: Any) -> None:
+    with pytest.raises(InputError, match=f"{name}: units = .* must be a unit that converts to"):
+        check_values(name, argument)
 
 
-def test_where_u_is_defined_its_direction_is_said() -> None:
+def test_displacements_have_their_direction_in_a_comment() -> None:
     result = call("sweep", variables=["permanent_displacement", "newmark_displacement"])
     for variable in (*result.data_vars.values(), call("simulate").relative_displacement):
         assert "cos(phi - theta) / cos(phi)" in variable.attrs["comment"]

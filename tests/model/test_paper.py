@@ -1,4 +1,4 @@
-"""The paper's two experiments: Tables 1 and 2 digit for digit, and what its formulas give where they differ."""
+"""The paper's two experiments: Tables 1 and 2 digit for digit, and its formulas."""
 
 from typing import Any
 
@@ -47,7 +47,7 @@ def test_tables_1_and_2(
     least: str,
     decay: str,
 ) -> None:
-    """But for lambda: Eq. 6 at the peak does not give that of Table 2, and no formula is bent to hide it."""
+    """But for lambda: Eq. 6 at the peak does not give that of Table 2."""
     parameters = slipsweep.friction_parameters(**experiment, model=slipsweep.Mendez(g=9.81))
     assert printed(parameters.limiting_acceleration) == limit, (
         "Eq. 7: limiting acceleration, Table 1"
@@ -108,7 +108,7 @@ def test_figures_with_the_printed_decay_rate(
 
 
 @pytest.mark.parametrize(
-    ("experiment", "frequency", "given", "displacement", "newmark", "flags"),
+    ("experiment", "frequency", "inputs", "displacement", "newmark", "flags"),
     [
         (STICK_SLIP, 1.8, {"yield_acceleration": None}, "31.0", "31.0", Validity.YIELD_GOVERNS),
         (CONTINUOUS, 3.5, {"yield_acceleration": None}, "68.9", "64.3", Validity.YIELD_GOVERNS),
@@ -127,17 +127,17 @@ def test_figures_with_the_printed_decay_rate(
         (CONTINUOUS, 3.5, {"decay_rate": 2.30, "delta_mu": 0.11}, "161.8", "316.5", Validity(0)),
     ],
 )
-def test_what_the_inputs_are_worth(
+def test_displacements_by_measured_printed_and_estimated_inputs(
     experiment: dict[str, Any],
     frequency: float,
-    given: dict[str, Any],
+    inputs: dict[str, Any],
     displacement: str,
     newmark: str,
     flags: Validity,
 ) -> None:
-    """The two experiments with what is measured, printed or estimated, Newmark's block beside them; mm."""
+    """Displacements of both experiments, measured, printed and estimated, and Newmark's; mm."""
     result = slipsweep.sweep(
-        **(experiment | given),
+        **(experiment | inputs),
         frequency=frequency,
         excitation=slipsweep.Sine(cycles=5),
         variables=["permanent_displacement", "newmark_displacement", "validity"],

@@ -1,4 +1,4 @@
-"""Units of what users give: numbers with a unit in one text, and factors to the parameters' own units."""
+"""Units of inputs: numbers with a unit in a text, and factors to the units of the parameters."""
 
 import math
 
@@ -11,7 +11,7 @@ MOON = 1.62
 
 
 @pytest.mark.parametrize(
-    ("text", "own", "value"),
+    ("text", "unit", "value"),
     [
         ("0.05", "m", 0.05),
         ("50mm", "m", 0.05),
@@ -43,20 +43,20 @@ MOON = 1.62
     ],
 )
 def test_a_number_with_a_unit_is_in_the_parameters_own(
-    text: str, own: str, value: float | None
+    text: str, unit: str, value: float | None
 ) -> None:
     """None: it is refused, by its name and text."""
     if value is not None:
-        assert quantity("--length", text, own, MOON) == pytest.approx(value, rel=1e-14)
+        assert quantity("--length", text, unit, MOON) == pytest.approx(value, rel=1e-14)
         return
     with pytest.raises(InputError) as refused:
-        quantity("--length", text, own, MOON)
+        quantity("--length", text, unit, MOON)
     assert str(refused.value).startswith("--length = ")
-    assert f"a unit that converts to {own}" in str(refused.value)
+    assert f"a unit that converts to {unit}" in str(refused.value)
 
 
 @pytest.mark.parametrize(
-    ("own", "units", "factor"),
+    ("unit", "units", "factor"),
     [
         ("m s-2", None, 1.0),
         ("m s-2", "g", MOON),
@@ -67,5 +67,5 @@ def test_a_number_with_a_unit_is_in_the_parameters_own(
         ("s", "ms", 1e-3),
     ],
 )
-def test_factors_to_own_units(own: str, units: str | None, factor: float) -> None:
-    assert conversion("axes.x.units", own, units, MOON) == pytest.approx(factor, rel=1e-14)
+def test_factors_to_own_units(unit: str, units: str | None, factor: float) -> None:
+    assert conversion("axes.x.units", unit, units, MOON) == pytest.approx(factor, rel=1e-14)

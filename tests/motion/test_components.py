@@ -209,7 +209,7 @@ def test_damaged_files_of_unam_are_refused(
     assert message in str(refused.value)
 
 
-def test_what_a_header_says_of_the_interval_holds(tmp_path: Path) -> None:
+def test_the_interval_of_a_header_holds(tmp_path: Path) -> None:
     path = write(tmp_path, JMA, "{:.4f},{:.4f},{:.4f}")
     assert_is(read_record(path, channel=1, interval=INTERVAL), 0)
     with pytest.raises(InputError, match=r"interval = 0\.02: the file itself says 0\.01"):

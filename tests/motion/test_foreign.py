@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from slipsweep import InputError, read_record
-from slipsweep.studies.hazard import read_hazard_curve
+from slipsweep.studies.hazard_curve import read_hazard_curve
 
 AT2 = b"PEER\nA place, 1/1/2000, 90\nACCELERATION IN UNITS OF G\nNPTS= 2, DT= .01\n .1 .2\n"
 

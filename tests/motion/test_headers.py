@@ -1,4 +1,4 @@
-"""What headers of recorded motions say: which number is the count and which the interval, units by their codes."""
+"""Headers of recorded motions: count and interval of the samples, units by their codes."""
 
 from pathlib import Path
 

@@ -99,7 +99,9 @@ def test_headings_of_old_files_are_read(tmp_path: Path) -> None:
         "acceleration (g)\n# recorded in the United States, units in metric",
     ],
 )
-def test_what_is_said_beside_an_acceleration_does_no_harm(tmp_path: Path, heading: str) -> None:
+def test_other_units_in_a_heading_are_not_those_of_the_acceleration(
+    tmp_path: Path, heading: str
+) -> None:
     path = written(tmp_path, heading)[2]
     assert read_record(path).attrs["record_units"] == "g"
 

@@ -1,4 +1,4 @@
-"""Intensity measures: closed forms, the same whatever the sampling of the same straight lines, and eqsig's."""
+"""Intensity measures: closed forms, other samplings of the same straight lines, and eqsig."""
 
 import math
 from typing import Any
@@ -38,7 +38,7 @@ def test_measures_of_a_sine_by_their_closed_forms() -> None:
     duration = cycles / frequency
     omega = 2.0 * math.pi * frequency
     times = np.arange(cycles * 2000 + 1) / (2000 * frequency)
-    found = measures(times, amplitude * np.sin(omega * times))
+    computed = measures(times, amplitude * np.sin(omega * times))
     expected = {
         "pga": amplitude,
         # v = A/ω (1 - cos ωt), which never changes its sign: d is A/ω t at the end of each cycle
@@ -50,22 +50,24 @@ def test_measures_of_a_sine_by_their_closed_forms() -> None:
         "mean_period": 1.0 / frequency,
     }
     for name, value in expected.items():
-        assert found[name] == pytest.approx(value, rel=2e-6 if name != "mean_period" else 2e-3), (
-            name
-        )
+        assert computed[name] == pytest.approx(
+            value, rel=2e-6 if name != "mean_period" else 2e-3
+        ), name
 
 
 def test_measures_of_two_straight_lines_by_hand() -> None:
     """Up to 1 and down to -1: every number by hand."""
-    found = measures([10.0, 11.0, 13.0], [0.0, 1.0, -1.0])
-    assert found["pga"] == 1.0
-    assert found["pgv"] == pytest.approx(0.5 + 0.5, rel=1e-15)  # where the acceleration passes zero
+    computed = measures([10.0, 11.0, 13.0], [0.0, 1.0, -1.0])
+    assert computed["pga"] == 1.0
+    assert computed["pgv"] == pytest.approx(
+        0.5 + 0.5, rel=1e-15
+    )  # where the acceleration passes zero
     # 1/6 to t = 1, then v = 1/2 + τ - τ²/2 > 0 up to τ = 2
-    assert found["pgd"] == pytest.approx(1.0 / 6.0 + 1.0 + 2.0 - 8.0 / 6.0, rel=1e-15)
-    assert found["arias_intensity"] == pytest.approx(math.pi / (2.0 * G) * 1.0, rel=1e-15)
-    assert found["cav"] == pytest.approx(0.5 + 1.0, rel=1e-15)
+    assert computed["pgd"] == pytest.approx(1.0 / 6.0 + 1.0 + 2.0 - 8.0 / 6.0, rel=1e-15)
+    assert computed["arias_intensity"] == pytest.approx(math.pi / (2.0 * G) * 1.0, rel=1e-15)
+    assert computed["cav"] == pytest.approx(0.5 + 1.0, rel=1e-15)
     # of ∫ = 1: t³/3 = 0.05, and symmetrically at the end
-    assert found["significant_duration"] == pytest.approx(
+    assert computed["significant_duration"] == pytest.approx(
         3.0 - 0.15 ** (1 / 3) - (1.0 - 0.85 ** (1 / 3)), rel=1e-14
     )
 
@@ -79,22 +81,22 @@ def test_the_mean_period_is_that_of_frequencies_up_to_20_hz() -> None:
 def test_a_constant_acceleration() -> None:
     """Where the cubic of the energy degenerates."""
     for last in (2.0, 2.0 + 1e-13, 2.0 + 1e-5):
-        found = measures([0.0, 10.0], [2.0, last])
-        assert found["significant_duration"] == pytest.approx(9.0, rel=1e-5)
-        assert found["pgd"] == pytest.approx(100.0, rel=1e-5)
-        assert found["cav"] == pytest.approx(20.0, rel=1e-5)
+        computed = measures([0.0, 10.0], [2.0, last])
+        assert computed["significant_duration"] == pytest.approx(9.0, rel=1e-5)
+        assert computed["pgd"] == pytest.approx(100.0, rel=1e-5)
+        assert computed["cav"] == pytest.approx(20.0, rel=1e-5)
 
 
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10**6), st.integers(2, 7))
 def test_more_samples_on_the_same_lines_change_nothing(seed: int, parts: int) -> None:
     record = noise(seed)
-    one, other = (
+    coarse, fine = (
         measures(each.times, each.acceleration) for each in (record, resampled(record, parts))
     )
-    del one["mean_period"]  # which the definition has of the samples
-    for name, value in one.items():
-        assert other[name] == pytest.approx(value, rel=1e-11), name
+    del coarse["mean_period"]  # which the definition has of the samples
+    for name, value in coarse.items():
+        assert fine[name] == pytest.approx(value, rel=1e-11), name
 
 
 @pytest.mark.parametrize("strength", ["scale", "amplitude", "pgv", "arias_intensity"])
@@ -120,8 +122,8 @@ def test_motions_without_a_measure() -> None:
     assert math.isnan(measures(10.0 * np.arange(400), noise(3).acceleration)["mean_period"])
 
 
-def test_as_eqsig_has_them() -> None:
-    """On the motions that pySLAMMER ships; eqsig's trapezoids have the straight lines sampled 16 times as finely."""
+def test_measures_are_those_of_eqsig() -> None:
+    """Motions of pySLAMMER; eqsig's trapezoids have the straight lines 16 times as finely."""
     eqsig = pytest.importorskip("eqsig")
     pyslammer = pytest.importorskip("pyslammer")
     for name, motion in pyslammer.sample_ground_motions().items():
@@ -137,8 +139,8 @@ def test_as_eqsig_has_them() -> None:
             "cav": eqsig.im.calc_cav(signal)[-1],
             "significant_duration": eqsig.im.calc_sig_dur(signal),
         }
-        found = measures(record.times, record.acceleration)
+        computed = measures(record.times, record.acceleration)
         for measure, value in expected.items():
             # eqsig's duration is from one sample to another
             near = {"abs": motion.dt / 8} if measure == "significant_duration" else {"rel": 3e-4}
-            assert found[measure] == pytest.approx(value, **near), f"{name}: {measure}"
+            assert computed[measure] == pytest.approx(value, **near), f"{name}: {measure}"

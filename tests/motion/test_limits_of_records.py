@@ -1,4 +1,4 @@
-"""Where a record begins to be refused: just within and just beyond each limit that docs/records.md names."""
+"""Records just within and just beyond each limit that docs/records.md names."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""Files of recorded motions: formats, units, baseline, channels, what is missing or implausible, what is refused."""
+"""Files of recorded motions: formats, units, baseline, channels, warnings and refusals."""
 
 import hashlib
 from math import pi
@@ -11,7 +11,11 @@ import pytest
 
 from slipsweep import InputError, Record, read_record, read_suite
 
-AT2 = "PEER STRONG MOTION DATABASE RECORD\nA PLACE, 1/1/2000\nACCELERATION TIME HISTORY IN UNITS OF G\n"
+AT2 = (
+    "PEER STRONG MOTION DATABASE RECORD\n"
+    "A PLACE, 1/1/2000\n"
+    "ACCELERATION TIME HISTORY IN UNITS OF G\n"
+)
 
 #: Typed in after the description of the format: 2^23 counts are 2000 gal, at 100 samples a second
 #: for 0.05 s.
@@ -85,7 +89,7 @@ def test_accelerations_alone_with_their_interval(tmp_path: Path, text: str, form
     )
 
 
-def test_knet(tmp_path: Path) -> None:
+def test_counts_of_knet_become_accelerations(tmp_path: Path) -> None:
     record = read_record(write(tmp_path, "XYZ001.NS", KNET))
     counts = np.array([419430, 0, -838861, 41943, -4194])
     np.testing.assert_allclose(record.acceleration, counts * 2000 / 8388608 * 0.01, rtol=1e-14)
@@ -93,7 +97,7 @@ def test_knet(tmp_path: Path) -> None:
     assert (record.attrs["record_format"], record.attrs["record_units"]) == ("knet", "gal")
 
 
-def test_baseline() -> None:
+def test_corrections_remove_the_mean_or_the_trend() -> None:
     times = np.linspace(0.0, 4.0, 401)
     record = Record(times, np.cos(2 * pi * times) + 0.3 + 0.2 * times)
     np.testing.assert_array_equal(record.corrected("none").acceleration, record.acceleration)
@@ -288,7 +292,7 @@ def test_peaks_of_999_gal_are_no_fill_values(tmp_path: Path) -> None:
     assert record.peak == pytest.approx(9.99)
 
 
-def test_what_a_summary_says(tmp_path: Path) -> None:
+def test_a_summary_has_interval_peaks_unit_and_cautions(tmp_path: Path) -> None:
     path = motion(tmp_path, TIMES, np.where(TIMES == 5.0, 0.3, 0.0))  # a triangle of 0.02 s
     expected = f"{path}: 10 s at 0.01 s, PGA 0.3 g, PGV {0.003 * 9.80665:.4g} m/s, read in g"
     expected = f"{expected}; caution: 100% of its samples are 0"
@@ -359,7 +363,7 @@ def test_a_trace_of_obspy() -> None:
 
 
 def test_cosmos_by_its_columns() -> None:
-    """Eight values to a line in columns of ten, cm/s², at 200 samples a second; the last ones touch."""
+    """Eight values to a line in columns of ten, cm/s², at 200 samples a second; the last touch."""
     record = read_record(V1)
     expected = [
         0.03630,
@@ -382,7 +386,10 @@ def test_cosmos_by_its_columns() -> None:
 def test_cosmos_with_several_channels(tmp_path: Path) -> None:
     first = V1.read_text()
     end = first.index("End-of-data")  # a V2 file has velocities behind its accelerations
-    pts = "       2 velocity pts, approx 0 secs, units=cm/s (05),Format=(8F10.5)\n   1.00000   2.00000\n"
+    pts = (
+        "       2 velocity pts, approx 0 secs, units=cm/s (05),Format=(8F10.5)\n"
+        "   1.00000   2.00000\n"
+    )
     other = first.replace("   0.03630", "  77.00000")
     velocity = first.replace("       1       1       4     120", "       2       2       5     120")
     path = write(tmp_path, "three.V2", first[:end] + pts + first[end:] + velocity + other)
@@ -390,11 +397,11 @@ def test_cosmos_with_several_channels(tmp_path: Path) -> None:
         InputError, match="channel = None: must be one of its 2 channels of acceleration"
     ):
         read_record(path)
-    found = [read_record(path, channel=number) for number in (1, 2)]
-    assert [float(record.acceleration[0]) for record in found] == pytest.approx(
+    channels = [read_record(path, channel=number) for number in (1, 2)]
+    assert [float(record.acceleration[0]) for record in channels] == pytest.approx(
         [0.000363, 0.77], rel=1e-15
     )
-    assert found[1].attrs["record_channel"] == "2"
+    assert channels[1].attrs["record_channel"] == "2"
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Suites: what is read of folders, patterns and lists, how motions are told apart, pairs of components."""
+"""Suites: folders, patterns and lists; labels of the motions; pairs of components."""
 
 import pickle
 from pathlib import Path
@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
-from slipsweep import InputError, Pair, Record, Suite, read_record, read_suite
-from slipsweep.motion.cutting import path_of_record
+from slipsweep import InputError, Pair, Record, Suite, read_record, read_suite, sweep
 from slipsweep.motion.intensity import arias_intensity
 from tests.support.intensity import measures_by_sums
 
@@ -89,19 +89,42 @@ def test_motions_that_are_the_same_are_told(folder: Path) -> None:
     assert "duplicate_motions" not in suite[["a", "b"]].attrs
 
 
-def test_a_suite_is_compared_by_what_is_in_it(folder: Path) -> None:
-    one = read_suite(folder)
-    sent = pickle.loads(pickle.dumps(one))
-    assert sent == one == read_suite(folder)
-    assert hash(sent) == hash(one)
-    # a worker gets it with every chunk, and makes the tables of its records once
-    assert path_of_record(sent.components[0], 1.0) is path_of_record(one.components[0], 1.0)
-    assert one != one[:2]
-    assert one[:2] == one[["a", "b"]] == one[[0, 1]]
+def test_suites_of_the_same_motions_are_equal(folder: Path) -> None:
+    suite = read_suite(folder)
+    sent = pickle.loads(pickle.dumps(suite))
+    assert sent == suite == read_suite(folder)
+    assert hash(sent) == hash(suite)
+
+
+def test_suites_of_other_motions_differ(folder: Path) -> None:
+    suite = read_suite(folder)
+    assert suite != suite[:2]
     changed = read_record(folder / "a.csv").corrected("mean")
-    assert one != Suite((changed, *one.motions[1:]), one.labels, one.name)
-    assert repr(one[:2]) == f"Suite({str(folder)!r}: 2 motions: a, b)"
+    assert suite != Suite((changed, *suite.motions[1:]), suite.labels, suite.name)
+
+
+def test_a_part_of_a_suite_is_taken_by_labels_numbers_or_a_slice(folder: Path) -> None:
+    suite = read_suite(folder)
+    assert suite[:2] == suite[["a", "b"]] == suite[[0, 1]]
+    assert suite[:2].labels == ("a", "b")
+
+
+def test_a_suite_prints_its_name_and_labels(folder: Path) -> None:
+    assert repr(read_suite(folder)[:2]) == f"Suite({str(folder)!r}: 2 motions: a, b)"
+
+
+def test_a_long_suite_prints_its_first_and_last_labels() -> None:
     assert "8 motions: 0, 1, 2, ..., 6, 7" in repr(Suite((noise(1),) * 8, tuple("01234567")))
+
+
+def test_a_suite_that_was_sent_to_a_worker_gives_the_same_displacements(folder: Path) -> None:
+    suite = read_suite(folder)
+    results = [
+        sweep(5.0, 0.1, scale=3.0, excitation=motions)
+        for motions in (suite, pickle.loads(pickle.dumps(suite)))
+    ]
+    xr.testing.assert_identical(*results)
+    assert (results[0].permanent_displacement > 0.0).any()
 
 
 def test_measures_along_the_motions(folder: Path) -> None:
@@ -110,8 +133,8 @@ def test_measures_along_the_motions(folder: Path) -> None:
     np.testing.assert_allclose(suite.measures["motion_interval"], [0.02, 0.03, 0.01], rtol=1e-14)
     for at, record in enumerate(suite.components):
         for name, value in measures_by_sums(record.times, record.acceleration).items():
-            found = suite.measures[f"motion_{name}"][at]
-            assert found == pytest.approx(value, rel=1e-4, nan_ok=True), name
+            measure = suite.measures[f"motion_{name}"][at]
+            assert measure == pytest.approx(value, rel=1e-4, nan_ok=True), name
 
 
 @pytest.mark.parametrize(
@@ -165,7 +188,7 @@ def test_a_rotation_is_exact_at_the_quarters_and_straight_between_samples() -> N
     first = noise(1)
     second = noise(2)
     pair = Pair(first, second)
-    for quarter, sign, one in (
+    for quarter, sign, component in (
         (0, 1, first),
         (1, 1, second),
         (2, -1, first),
@@ -173,15 +196,17 @@ def test_a_rotation_is_exact_at_the_quarters_and_straight_between_samples() -> N
         (4, 1, first),
     ):
         np.testing.assert_array_equal(
-            pair.rotated(90.0 * quarter).acceleration, sign * one.acceleration
+            pair.rotated(90.0 * quarter).acceleration, sign * component.acceleration
         )
     # what stands at right angles has the rest of the energy
-    whole = sum(arias_intensity(one.times, one.acceleration) for one in (first, second))
+    whole = sum(
+        arias_intensity(component.times, component.acceleration) for component in (first, second)
+    )
     for azimuth in (10.0, 33.3, 77.0):
         both = (pair.rotated(azimuth), pair.rotated(azimuth + 90.0))
-        assert sum(arias_intensity(one.times, one.acceleration) for one in both) == pytest.approx(
-            whole, rel=1e-13
-        )
+        assert sum(
+            arias_intensity(component.times, component.acceleration) for component in both
+        ) == pytest.approx(whole, rel=1e-13)
         assert both[0] == Pair(first, second).rotated(azimuth)
 
 
@@ -197,85 +222,29 @@ def test_the_shorter_component_is_continued_with_zeros() -> None:
         Pair(first, noise(2, 50, 0.02))
 
 
-def test_pairs_by_the_endings_of_their_names(tmp_path: Path) -> None:
-    for name in ("one_NS", "one_EW", "two_NS", "two_EW"):
-        write(
-            tmp_path / f"{name}.csv",
-            np.random.default_rng(len(name)).normal(size=5) + ("two" in name),
-        )
-    suite = read_suite(tmp_path, pairs=("_NS", "_EW"))
-    assert suite.labels == ("one", "two")
-    assert suite.has_pairs
-    assert suite["two"] == Pair(
-        read_record(tmp_path / "two_NS.csv"), read_record(tmp_path / "two_EW.csv")
-    )
-    listed = read_suite(
-        [[tmp_path / f"{name}_NS.csv", tmp_path / f"{name}_EW.csv"] for name in ("one", "two")]
-    )
-    assert listed.motions == suite.motions
-    assert suite.measures["motion_file"].tolist() == [
-        "one_NS.csv one_EW.csv",
-        "two_NS.csv two_EW.csv",
-    ]
-    write(tmp_path / "one_UD.csv")
-    assert read_suite(tmp_path, pairs=("_NS", "_EW")).motions == suite.motions
-    write(tmp_path / "three_NS.csv")
-    write(tmp_path / "single.csv")
-    with pytest.raises(
-        InputError, match=r"without the other component: single\.csv, three_NS\.csv"
-    ):
-        read_suite(tmp_path, pairs=("_NS", "_EW"))
-    for pairs in ("_NS", ("_NS",), ("_NS", ""), ("_NS", "_NS"), (1, 2)):
-        with pytest.raises(InputError, match=r"^pairs = "):
-            read_suite(tmp_path, pairs=pairs)  # type: ignore[arg-type]
-
-
 # ------------------------------------------------------------------------------ vertical components
 
 
-def test_vertical_components_are_left_out_and_named(folder: Path) -> None:
-    """By their names, which need not be read, and by their headers; an explicit word takes them."""
-    expected = read_suite(folder)
-    header = "PEER\nA place, 1/1/2000, A station, {}\nACCELERATION IN UNITS OF G\n"
-    at2 = f"{header}NPTS= 3, DT= .01\n0 .1 0\n"
-    (folder / "e.AT2").write_text(at2.format("VERT"))
-    (folder / "RSN1_A-UP.AT2").write_text(at2.format("UP"))
-    (folder / "z.UD").write_text("damaged\n")
-    for paths in (folder, f"{folder}/*", sorted(folder.iterdir())):
-        suite = read_suite(paths)
-        assert suite.motions == expected.motions
-        assert suite.left_out == ("RSN1_A-UP.AT2 (UP)", "e.AT2 (VERT)", "z.UD (UD)")
-        assert "; left out: RSN1_A-UP.AT2 (UP), e.AT2 (VERT), z.UD (UD))" in repr(suite)
-        assert suite.summary().endswith(
-            "left out, vertical components: RSN1_A-UP.AT2 (UP), e.AT2 (VERT), z.UD (UD); "
-            "vertical = 'accept' takes them"
-        )
-        assert suite.attrs["left_out_vertical"] == ", ".join(suite.left_out)
-    with pytest.raises(InputError, match=r"1 of 6 files cannot be read: z\.UD"):
-        read_suite(folder, vertical="accept")
-    (folder / "z.UD").unlink()
-    accepted = read_suite(folder, vertical="accept")
-    assert accepted.labels == ("RSN1_A-UP", "a", "b", "c", "e")
-    assert accepted.left_out == ()
-    assert accepted["e"].attrs["record_caution"] == "vertical component (VERT)"
-    assert accepted.cautions() == [
-        f"caution: {folder / 'RSN1_A-UP.AT2'}: vertical component (UP)",
-        f"caution: {folder / 'e.AT2'}: vertical component (VERT)",
-    ]
-
-
-def test_what_a_suite_of_vertical_components_says(folder: Path) -> None:
+def test_a_suite_of_vertical_components_only_is_refused(folder: Path) -> None:
     up = write(folder / "a_UP.csv")
-    with pytest.raises(
-        InputError, match=r"vertical components only: a_UP\.csv \(UP\); vertical = "
-    ):
+    with pytest.raises(InputError, match=r"vertical components only: a_UP\.csv \(UP\); vertical ="):
         read_suite([up])
+
+
+def test_a_vertical_component_in_a_pair_is_refused(folder: Path) -> None:
+    up = write(folder / "a_UP.csv")
     with pytest.raises(InputError, match=r"vertical components in pairs: a_UP\.csv \(UP\)"):
         read_suite([(folder / "a.csv", up)])
+
+
+def test_another_choice_of_vertical_components_is_refused(folder: Path) -> None:
     with pytest.raises(InputError, match="vertical = 'no': must be one of 'leave_out', 'accept'"):
         read_suite(folder, vertical="no")  # type: ignore[arg-type]
-    record = read_record(up)
-    assert read_suite([record]).motions == (record,)  # a Record was chosen by its reader
+
+
+def test_a_vertical_record_that_was_read_by_itself_is_accepted(folder: Path) -> None:
+    record = read_record(write(folder / "a_UP.csv"))
+    assert read_suite([record]).motions == (record,)
 
 
 def test_a_vertical_channel_is_left_out(tmp_path: Path) -> None:
@@ -286,3 +255,98 @@ def test_a_vertical_channel_is_left_out(tmp_path: Path) -> None:
     suite = read_suite(tmp_path, channel=2, implausible="accept")
     assert suite.labels == ("one",)
     assert suite.left_out == ("two.csv (UD)",)
+
+
+@pytest.fixture
+def pairs(tmp_path: Path) -> Path:
+    """Two motions of two components, by the endings of their names."""
+    for name in ("one_NS", "one_EW", "two_NS", "two_EW"):
+        values = np.random.default_rng(len(name)).normal(size=5) + ("two" in name)
+        write(tmp_path / f"{name}.csv", values)
+    return tmp_path
+
+
+def test_pairs_are_told_by_the_endings_of_their_names(pairs: Path) -> None:
+    suite = read_suite(pairs, pairs=("_NS", "_EW"))
+    assert suite.has_pairs
+    assert suite.labels == ("one", "two")
+    expected = Pair(read_record(pairs / "two_NS.csv"), read_record(pairs / "two_EW.csv"))
+    assert suite["two"] == expected
+    files = ["one_NS.csv one_EW.csv", "two_NS.csv two_EW.csv"]
+    assert suite.measures["motion_file"].tolist() == files
+
+
+def test_pairs_are_listed(pairs: Path) -> None:
+    paths = [[pairs / f"{name}_NS.csv", pairs / f"{name}_EW.csv"] for name in ("one", "two")]
+    assert read_suite(paths).motions == read_suite(pairs, pairs=("_NS", "_EW")).motions
+
+
+def test_vertical_components_beside_pairs_are_left_out(pairs: Path) -> None:
+    expected = read_suite(pairs, pairs=("_NS", "_EW")).motions
+    write(pairs / "one_UD.csv")
+    assert read_suite(pairs, pairs=("_NS", "_EW")).motions == expected
+
+
+def test_components_without_the_other_are_refused(pairs: Path) -> None:
+    write(pairs / "three_NS.csv")
+    write(pairs / "single.csv")
+    message = r"without the other component: single\.csv, three_NS\.csv"
+    with pytest.raises(InputError, match=message):
+        read_suite(pairs, pairs=("_NS", "_EW"))
+
+
+@pytest.mark.parametrize("endings", ["_NS", ("_NS",), ("_NS", ""), ("_NS", "_NS"), (1, 2)])
+def test_endings_that_are_no_two_texts_are_refused(pairs: Path, endings: Any) -> None:
+    with pytest.raises(InputError, match=r"^pairs = "):
+        read_suite(pairs, pairs=endings)
+
+
+AT2 = """PEER
+A place, 1/1/2000, A station, {}
+ACCELERATION IN UNITS OF G
+NPTS= 3, DT= .01
+0 .1 0
+"""
+
+
+@pytest.fixture
+def with_verticals(folder: Path) -> Path:
+    """The folder with two vertical components by their headers, of which one also by its name."""
+    (folder / "e.AT2").write_text(AT2.format("VERT"))
+    (folder / "RSN1_A-UP.AT2").write_text(AT2.format("UP"))
+    return folder
+
+
+@pytest.mark.parametrize("kind", ["folder", "pattern", "list"])
+def test_vertical_components_are_left_out_and_named(with_verticals: Path, kind: str) -> None:
+    """By their headers or by their names, which need not be read."""
+    (with_verticals / "z.UD").write_text("damaged\n")
+    paths: dict[str, Any] = {
+        "folder": with_verticals,
+        "pattern": f"{with_verticals}/*",
+        "list": sorted(with_verticals.iterdir()),
+    }
+    suite = read_suite(paths[kind])
+    assert suite.labels == ("a", "b", "c")
+    names = "RSN1_A-UP.AT2 (UP), e.AT2 (VERT), z.UD (UD)"
+    assert ", ".join(suite.left_out) == suite.attrs["left_out_vertical"] == names
+    assert f"; left out: {names})" in repr(suite)
+    left_out = f"left out, vertical components: {names}; vertical = 'accept' takes them"
+    assert suite.summary().endswith(left_out)
+
+
+def test_vertical_components_are_accepted_with_a_caution(with_verticals: Path) -> None:
+    suite = read_suite(with_verticals, vertical="accept")
+    assert suite.labels == ("RSN1_A-UP", "a", "b", "c", "e")
+    assert suite.left_out == ()
+    assert suite["e"].attrs["record_caution"] == "vertical component (VERT)"
+    assert suite.cautions() == [
+        f"caution: {with_verticals / 'RSN1_A-UP.AT2'}: vertical component (UP)",
+        f"caution: {with_verticals / 'e.AT2'}: vertical component (VERT)",
+    ]
+
+
+def test_an_accepted_vertical_component_has_to_be_read(folder: Path) -> None:
+    (folder / "z.UD").write_text("damaged\n")
+    with pytest.raises(InputError, match=r"1 of 4 files cannot be read: z\.UD"):
+        read_suite(folder, vertical="accept")

@@ -45,27 +45,33 @@ def exact(waveform: Waveform, phase: np.ndarray) -> np.ndarray:
         values = []
         cycles = {n: list(reference.sections(n, mpfr(1))) for n in {*numbers}}
         for n, phi in zip(numbers, phase.tolist(), strict=True):
-            own = phi - 2 * gmpy2.const_pi() * n
-            values.append(float(next(one for one in cycles[n] if own <= one.end).ground(own)))
+            in_cycle = phi - 2 * gmpy2.const_pi() * n
+            values.append(
+                float(
+                    next(section for section in cycles[n] if in_cycle <= section.end).ground(
+                        in_cycle
+                    )
+                )
+            )
     return np.array(values)
 
 
 @each
 def test_pieces_are_the_wave(name: str) -> None:
-    """1e-14 and the rounding of mφ, monotone and of one sign; harmonics of fifty times the frequency included."""
+    """To 1e-14 and the rounding of mφ, monotone and of one sign; harmonics up to the fiftieth."""
     waveform = EVERY[name]
     wave = wave_of(waveform)
     fastest = max(waveform.multiples) if isinstance(waveform, Harmonics) else 1
-    for p, one in enumerate(wave.pieces):
-        tau = one.begin + np.linspace(0.01, 0.99, 23) * (one.finish - one.begin)
-        phase = one.start + (tau - one.begin)
+    for p, piece in enumerate(wave.pieces):
+        tau = piece.begin + np.linspace(0.01, 0.99, 23) * (piece.finish - piece.begin)
+        phase = piece.start + (tau - piece.begin)
         if wave.repeats and p >= wave.cycle[wave.lead + 1]:
             phase += 2 * pi * (wave.repeats - 1)  # the table has the plain cycle once
-        found = np.polyval([*one.coefficients[: one.degree][::-1], one.top], tau)
-        error = np.abs(found - exact(waveform, phase)).max()
+        values = np.polyval([*piece.coefficients[: piece.degree][::-1], piece.top], tau)
+        error = np.abs(values - exact(waveform, phase)).max()
         assert error < 1e-14 + 4e-16 * fastest * 8 * pi, f"piece {p}: off by {error:.1e}"
-        assert np.all(np.diff(found) * (one.last - one.first) >= 0), f"piece {p}: not monotone"
-        assert np.all(found * (one.first + one.last) > 0), f"piece {p}: changes its sign"
+        assert np.all(np.diff(values) * (piece.last - piece.first) >= 0), f"piece {p}: not monotone"
+        assert np.all(values * (piece.first + piece.last) > 0), f"piece {p}: changes its sign"
 
 
 @each
@@ -105,20 +111,20 @@ THREE_ZEROS = Harmonics([0.2536777542789753, 0.1692128468453051], [2, 3], cycles
 
 @pytest.mark.parametrize("power", range(1, 6))
 def test_zeros_that_lie_close_together_are_told_apart(power: int) -> None:
-    """a sin 2φ + b sin 3φ = sin φ (2a cos φ + b (4 cos² φ − 1)) in closed form, about π at distances 10⁻¹ to 10⁻⁵."""
+    """a sin 2φ + b sin 3φ = sin φ (2a cos φ + b (4 cos² φ − 1)), 10⁻¹ to 10⁻⁵ about π."""
     a = 1.0
     b = 2 / 3 * (1 + 10.0 ** (-2 * power))
     ends = wave_of(Harmonics([a, b], [2, 3], cycles=1)).pieces
-    found = ends["start"][ends["first"] == 0.0]
+    zeros = ends["start"][ends["first"] == 0.0]
     # 4b x² + 2a x − b = 0 in x = cos φ; the root near −1 as a distance from it
     top = (-2 * a - np.sqrt(4 * a * a + 16 * b * b)) / (8 * b)
     nearer = 2 * np.arcsin(np.sqrt((1 + top) / 2))
     for expected in (pi - nearer, pi, pi + nearer):
-        assert np.abs(found - expected).min() < 1e-3 * nearer
+        assert np.abs(zeros - expected).min() < 1e-3 * nearer
 
 
 def test_friction_turns_at_each_zero() -> None:
-    """Continuous sliding over three close zeros, against Gauss's rule between them; all solvers share the pieces."""
+    """Continuous sliding over three close zeros, against Gauss's rule between them."""
     theta = 0.0
     mu_s = 0.33292316
     amplitude = 8.9043785
@@ -163,7 +169,7 @@ def test_friction_turns_at_each_zero() -> None:
             moved += float((half * weights * rate(phase) * (2 * pi * (12 - cycle) - phase)).sum())
     expected = moved / (2 * pi * frequency) ** 2
     for solver in (Cycle(), Step(rule="simpson", steps_per_cycle=1024)):
-        found = sweep(
+        result = sweep(
             theta,
             mu_s,
             amplitude,
@@ -173,7 +179,7 @@ def test_friction_turns_at_each_zero() -> None:
             excitation=THREE_ZEROS,
             solver=solver,
         )
-        assert float(found.permanent_displacement) == pytest.approx(expected, rel=1e-7)
+        assert float(result.permanent_displacement) == pytest.approx(expected, rel=1e-7)
 
 
 def test_one_plain_cycle_stands_for_all() -> None:

@@ -14,9 +14,10 @@ import xarray as xr
 import slipsweep
 from benchmarks.calibration import drawn, sensed
 from slipsweep.model.options import Mendez
-from slipsweep.motion.shaking import CHANNELS, ShakingTest
-from slipsweep.studies.calibration import calibrate
-from slipsweep.studies.likelihood import Observation
+from slipsweep.studies.calibration.calibrate import calibrate
+from slipsweep.studies.calibration.likelihood import Likelihood
+from slipsweep.studies.calibration.observation import Observation
+from slipsweep.studies.calibration.shaking_test import CHANNELS, ShakingTest
 from tests.support.shaking import SOUGHT, coloured
 
 #: Standard deviations of a normal distribution to the ends of 95 %.
@@ -163,9 +164,9 @@ def test_noise_is_estimated_with_the_degrees_of_freedom_that_are_left() -> None:
         }
         test = ShakingTest(times, channels)
         observation = Observation(test, 6.0, 0.38, Mendez(), (), (), {})
-        observation.linearize(at_rest)
-        misfit = observation.misfits(at_rest)[0]
-        observation.settle(at_rest)
+        likelihood = Likelihood(observation, at_rest)
+        misfit = likelihood.misfits(at_rest)[0]
+        likelihood.settle(at_rest)
         variances.append((observation.noise[0] / NOISE) ** 2)
         shares.append((misfit / NOISE) ** 2)
     assert np.mean(variances) == pytest.approx(1.0, abs=0.06)

@@ -26,8 +26,8 @@ from slipsweep.studies.hazard import (
     exceedance_rates,
     fragility,
     openquake_fragility,
-    read_hazard_curve,
 )
+from slipsweep.studies.hazard_curve import read_hazard_curve
 from tests.studies.test_suite_statistics import suite_result
 from tests.support.commands import command
 
@@ -70,7 +70,7 @@ def test_the_closed_form_of_a_power_law_and_a_lognormal_fragility(
     assert found["lower_rate"] < expected < found["upper_rate"] < 1.1 * expected
 
 
-def test_a_step_is_the_curve_itself() -> None:
+def test_a_step_of_the_fragility_gives_the_rate_of_the_curve() -> None:
     """A fragility of 0 and then 1 gives the rate of what it jumps at, wherever points of the curve lie."""
     curve = curve_of([1.0, 2.0, 8.0], [0.1, 0.01, 0.001])
     found = exceedance_rates(curve, [1.0, 4.0 * (1 - 1e-12), 4.0, 8.0], [0.0, 0.0, 1.0, 1.0])
@@ -80,7 +80,7 @@ def test_a_step_is_the_curve_itself() -> None:
     assert float(found["omitted_rate"]) == 0.0
 
 
-def test_what_lies_outside_is_told() -> None:
+def test_rates_outside_of_the_amplitudes_are_held_above_and_omitted_below() -> None:
     """The probability is held above and taken as 0 below, also where the curve ends first."""
     curve = curve_of([1.0, 10.0], [0.1, 0.001])
     found = exceedance_rates(curve, [2.0, 5.0], [[0.25, 0.0], [0.25, 0.5]])
@@ -112,9 +112,7 @@ def test_rates_are_the_integral_over_straight_lines() -> None:
     )
 
 
-def test_the_rate_lies_between_those_of_the_lower_and_the_higher_probability_of_two_amplitudes() -> (
-    None
-):
+def test_lower_and_upper_rate_are_those_of_the_lower_and_higher_probability() -> None:
     curve = curve_of([0.5, 2.0, 8.0], [0.1, 0.01, 0.001])
     found = exceedance_rates(curve, [1.0, 4.0], [[0.0], [1.0]])
     first, last = curve.rate_at(np.array([1.0, 4.0]))
@@ -123,7 +121,7 @@ def test_the_rate_lies_between_those_of_the_lower_and_the_higher_probability_of_
     )
 
 
-def test_of_a_suite_by_hand() -> None:
+def test_rates_of_a_suite_are_those_by_hand() -> None:
     """Shares of motions; amplitudes in any order and 0; amplitudes, and grid points, without a value."""
     nan = np.nan
     unstable = int(Validity.STATICALLY_UNSTABLE)
@@ -165,7 +163,7 @@ def test_of_a_suite_by_hand() -> None:
     assert certain.annual_rate[0, 0].item() == pytest.approx(0.1 / 3.0 / 9.0, rel=1e-12)
 
 
-def test_friction_that_is_uncertain_over_a_suite() -> None:
+def test_rates_under_uncertain_friction_pool_samples_and_motions() -> None:
     """Pooled by `sample` or not, motions weigh the same; the rate is that of the fragility of all samples."""
     curve = power_law(1e-3, 2.0)
     times = np.arange(0.0, 4.0, 0.01)
@@ -196,7 +194,7 @@ def test_friction_that_is_uncertain_over_a_suite() -> None:
         displacement_hazard(pooled, curve, 0.03)
 
 
-def test_a_fragility_in_the_form_of_openquake() -> None:
+def test_a_fragility_is_written_as_openquake_reads_it() -> None:
     u = np.array([[[0.0, 0.1], [0.02, 0.2], [0.3, 0.4]]] * 2)
     result = suite_result(u, np.zeros_like(u), ("mu_s", "amplitude", "motion"))
     result = result.assign_coords(amplitude=[0.981, 1.962, 3.924], mu_s=[0.3, 0.4])
@@ -215,7 +213,7 @@ def test_a_fragility_in_the_form_of_openquake() -> None:
     assert poes == {"u_above_10_mm": "0.5 1 1", "u_above_50_mm": "0.5 0.5 1"}
 
 
-def test_a_curve_is_read(tmp_path: Path) -> None:
+def test_a_curve_is_read_in_its_units(tmp_path: Path) -> None:
     path = tmp_path / "hazard.csv"
     path.write_text(CURVE)
     curve = read_hazard_curve(path, 9.81)
@@ -234,7 +232,7 @@ b,13.0,42.0,0.0,9.0E-01,3.0E-01,5.0E-02,5.0E-03,1.0E-04
 """
 
 
-def test_a_file_of_openquake(tmp_path: Path) -> None:
+def test_probabilities_of_openquake_become_annual_rates(tmp_path: Path) -> None:
     """Probabilities in 50 years become annual rates, −ln(1 − p)/50; 1 and 0 are no rates."""
     path = tmp_path / "hazard_curve-mean-PGA_12.csv"
     path.write_text(OPENQUAKE)
@@ -264,7 +262,9 @@ def test_a_file_of_openquake(tmp_path: Path) -> None:
         ("truncation_level=3", None),
     ],
 )
-def test_the_measure_of_a_file_of_openquake(tmp_path: Path, imt: str, measure: str | None) -> None:
+def test_curves_of_openquake_that_are_not_of_pga_are_refused(
+    tmp_path: Path, imt: str, measure: str | None
+) -> None:
     """Another measure than PGA is refused whatever its quotes; none wants a word."""
     path = tmp_path / "hazard.csv"
     path.write_text(OPENQUAKE.replace("imt='PGA'", imt).replace("time=50.0", "time = 50.0"))

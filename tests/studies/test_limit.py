@@ -67,7 +67,7 @@ def test_inverse_of_sweep_to_the_last_bit(options: dict[str, Any]) -> None:
     np.testing.assert_array_equal(limits.limit_status >= LimitStatus.NOT_REACHED, ~found)
 
 
-def test_newmark_closed_form() -> None:
+def test_limits_of_newmarks_block_are_those_of_the_closed_form() -> None:
     """One pulse of Newmark's block, solved by Brent's method on the classical closed form."""
     yielded = 1.5
     omega = 2 * math.pi * 2.0
@@ -101,7 +101,7 @@ def test_newmark_closed_form() -> None:
         assert limits.limit_status.item() == LimitStatus.REACHED
 
 
-def test_target_in_the_jump_of_the_mode_limit() -> None:
+def test_a_target_within_the_jump_is_reached_at_the_mode_limit() -> None:
     limit = slipsweep.friction_parameters(5, 0.3, 1.0).limiting_acceleration.item()
     amplitudes = np.concatenate([np.linspace(2.0, limit, 20_001), [np.nextafter(limit, np.inf)]])
     moved = sweep(5, 0.3, amplitudes, 2.0).permanent_displacement.values
@@ -114,7 +114,7 @@ def test_target_in_the_jump_of_the_mode_limit() -> None:
     assert (limits.sliding_mode == SlidingMode.CONTINUOUS).all()
 
 
-def test_gap_in_validity() -> None:
+def test_a_target_beyond_a_gap_without_values_is_reached_after_it() -> None:
     """With mu_s > 1 the calibrated decay rate is not positive below the mode limit, from xi = mu_s^-1/2 on."""
     given: dict[str, Any] = {"theta": 10, "mu_s": 1.2, "frequency": 1.0, "yield_acceleration": 4.0}
     limit = slipsweep.friction_parameters(
@@ -177,7 +177,7 @@ def test_beside_a_gap_every_displacement_is_reached() -> None:
         assert sweep(amplitude=edge * (1 + 1e-3), **one).permanent_displacement < 1e5
 
 
-def test_narrow_peaks_where_blocks_do_not_recouple() -> None:
+def test_narrow_peaks_of_blocks_that_do_not_recouple_are_found() -> None:
     """The limit is never above the first of 20 000 amplitudes that reaches the target: u(A) is a saw, or has a kink."""
     names = ("theta", "mu_s", "yield_acceleration", "displacement")
     rows = [
@@ -217,7 +217,7 @@ def test_peaks_of_a_record_where_slips_become_one(seed: int, displacement: float
     assert 0.999 * first < limit <= first
 
 
-def test_statuses_without_a_limit() -> None:
+def test_cells_without_a_limit_say_why() -> None:
     limits = limit_amplitude(1e6, [0, 20], 0.3, 1.0)
     np.testing.assert_array_equal(
         limits.limit_status, [LimitStatus.NOT_REACHED, LimitStatus.INVALID]
@@ -237,7 +237,9 @@ def test_statuses_without_a_limit() -> None:
     )
 
 
-def test_zipped_inputs_and_slabs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_limits_of_zipped_inputs_do_not_depend_on_how_they_are_cut(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """Cells that share a dimension, scanned in slabs of a few, give the bits of single calls."""
     case = {"displacement": [0.01, 0.2, 0.05], "theta": [2.0, 6.0, 9.0], "mu_s": [0.3, 0.5, 0.4]}
     case["frequency"] = [1.0, 2.0, 0.7]

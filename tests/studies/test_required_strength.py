@@ -9,10 +9,9 @@ import xarray as xr
 
 import slipsweep
 from slipsweep import InputError, Newmark, Record, Sine, Suite, required_strength, sweep
-from slipsweep.grid.inputs import Inputs
 from slipsweep.model.variables import StrengthStatus
+from slipsweep.studies.required_strength import plan_strength
 from slipsweep.studies.sampling import Sampling
-from slipsweep.studies.strength import plan_strength
 from tests.support.made_up_records import few_pulses
 
 G = 9.81
@@ -347,7 +346,7 @@ def test_motions_that_no_strength_holds_are_above_all_others() -> None:
 
 
 def test_parts_of_a_plan_give_the_same_bits() -> None:
-    inputs = Inputs(amplitude=[1.0, 2.0, 4.0], polarity="both", time_scale=[1.0, 2.0])
+    inputs = {"amplitude": [1.0, 2.0, 4.0], "polarity": "both", "time_scale": [1.0, 2.0]}
     plan = plan_strength([0.001, 0.01], inputs, excitation=SUITE)
     whole = plan.solve()
     assert plan.cells == 3 * 2 * 2 * 2 * 3
@@ -410,7 +409,7 @@ def test_samples_of_a_sweep_file_with_sobol_indices() -> None:
         g=G,
         sensitivity=True,
     )
-    inputs = Inputs(amplitude=3.0, frequency=1.0)
+    inputs = {"amplitude": 3.0, "frequency": 1.0}
     found = plan_strength(0.05, inputs, sampling=sampling).solve()
     draws = sampling.draws["amplitude"][:64]
     expected = required_strength(0.05, 3.0 * draws, 1.0).required_yield_coefficient

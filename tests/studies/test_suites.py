@@ -8,7 +8,6 @@ import pytest
 import xarray as xr
 
 from slipsweep import InputError, Pair, Record, Suite, limit_amplitude, sample, sweep
-from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.plans import plan_sweep
 from slipsweep.model.variables import BOTH_WAYS, DEFAULT_RECORD_RESULTS, RECORD_RESULTS
 from tests.support.intensity import measures_by_sums
@@ -118,7 +117,12 @@ def test_lazy_results_and_parts_have_the_same_bits() -> None:
     for name in now:
         np.testing.assert_array_equal(later[name].compute(), now[name], err_msg=str(name))
     plan = plan_sweep(
-        Inputs(theta=[0, 5], mu_s=[0.1, 0.3], amplitude=given["amplitude"], polarity="both"),
+        {
+            "theta": [0, 5],
+            "mu_s": [0.1, 0.3],
+            "amplitude": given["amplitude"],
+            "polarity": "both",
+        },
         excitation=SUITE,
     )
     part = plan.part({"motion": slice(1, 2), "theta": slice(1, 2)})

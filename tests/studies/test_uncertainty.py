@@ -155,7 +155,7 @@ BLOCK = {
 
 @pytest.mark.parametrize("kind", ["absolute", "factor", "offset"])
 @pytest.mark.parametrize("name", [*BLOCK, "phi", "yield_coefficient"])
-def test_each_parameter_and_kind(name: str, kind: str) -> None:
+def test_each_parameter_is_drawn_by_each_kind(name: str, kind: str) -> None:
     """One parameter drawn, against a sweep over its draws."""
     left_out = "amplitude" if name == "displacement_amplitude" else "displacement_amplitude"
     given: dict[str, Any] = {key: value for key, value in BLOCK.items() if key != left_out}
@@ -184,7 +184,7 @@ def test_each_parameter_and_kind(name: str, kind: str) -> None:
     np.testing.assert_allclose(found.displacement_quantile, expected, rtol=1e-11)
 
 
-def test_of_a_displacement_amplitude() -> None:
+def test_samples_of_a_displacement_amplitude_depend_on_the_frequency() -> None:
     """A = ω²d: the frequency axis is then real work, and drawn frequencies enter A too."""
     uncertain = {"displacement_amplitude": FACTOR, "frequency": {**FACTOR, "s": 0.1}}
     grid: dict[str, Any] = {"theta": 5.0, "mu_s": 0.4}
@@ -213,7 +213,7 @@ def test_of_a_displacement_amplitude() -> None:
     assert found.mode_share.dims == ("displacement_amplitude", "frequency", "mode")
 
 
-def test_the_scaling_law() -> None:
+def test_samples_obey_the_scaling_law() -> None:
     """u = W/ω²: twice the frequency, a quarter of every quantile, and P(u > d/4) what P(u > d) was."""
     options: dict[str, Any] = {"uncertain": {"amplitude": FACTOR}, "samples": 512}
     one = slipsweep.sample(**{**GRID, "frequency": 1.0}, **options, thresholds=[0.04, 0.4])
@@ -228,7 +228,7 @@ def test_the_scaling_law() -> None:
 @pytest.mark.parametrize(
     "name", ["yield_acceleration", "minimum_friction", "delta_mu", "decay_rate"]
 )
-def test_factor_on_an_estimate(name: str) -> None:
+def test_a_factor_multiplies_the_estimate_of_a_parameter(name: str) -> None:
     """Where the parameter is not given, its estimate (Coulomb's, Eqs. 9-11, Eq. 6) at each draw is what scatters."""
     uncertain: dict[str, Any] = {
         name: {"distribution": "uniform", "loc": 0.9, "scale": 0.2, "kind": "factor"},
@@ -405,7 +405,7 @@ def test_a_seed_gives_the_same_bits(method: str) -> None:
         ({}, "uncertain: must give the distribution of one parameter at least"),
     ],
 )
-def test_bad_distributions(change: dict[str, Any], message: str) -> None:
+def test_impossible_distributions_are_refused(change: dict[str, Any], message: str) -> None:
     given = {
         name: value for name, value in GRID.items() if name not in change or "amplitude" in change
     }
@@ -432,7 +432,7 @@ def test_draws_are_checked_at_both_ends_of_an_axis() -> None:
         ({"frequency": None}, "frequency: must be given"),
     ],
 )
-def test_bad_options(options: dict[str, Any], message: str) -> None:
+def test_impossible_options_are_refused(options: dict[str, Any], message: str) -> None:
     uncertain = {
         "theta": {"distribution": "uniform", "scale": 2, "kind": "offset"},
         "amplitude": FACTOR,
@@ -525,7 +525,9 @@ def test_a_result_is_repeated_from_itself(folder: Path) -> None:
         ),
     ],
 )
-def test_bad_sweep_files(tmp_path: Path, old: str, new: str, message: str) -> None:
+def test_impossible_sweep_files_are_refused(
+    tmp_path: Path, old: str, new: str, message: str
+) -> None:
     (tmp_path / "x.toml").write_text(FILE.replace(old, new, 1))
     done = command(tmp_path, "run", "x.toml")
     assert done.returncode == 2

@@ -10,8 +10,8 @@ import pytest
 import xarray as xr
 
 import slipsweep
-from slipsweep.charts import solved
 from slipsweep.cli import main
+from slipsweep.studies.cautions import percent, slides_back_text
 from slipsweep.studies.upslope import sliding_ways, upslope_yield_acceleration
 
 G = 9.81
@@ -49,7 +49,7 @@ def test_the_upslope_yield_acceleration_is_that_of_statics() -> None:
 def test_a_level_floor_has_the_caution_and_moves_a_tenth_in_truth(model: str) -> None:
     result = slipsweep.sweep(**FLOOR, model=model)
     assert result.permanent_displacement.item() == pytest.approx(0.0392, rel=0.02)
-    text = solved.slides_back_text(result)
+    text = slides_back_text(result)
     assert text.startswith("the base's acceleration also exceeds the upslope yield acceleration")
     assert 'sliding = "both" of [model] friction = "newmark"' in text
     # the same block, stepped, sliding both ways under friction of constant size
@@ -94,8 +94,8 @@ def test_the_caution_is_where_the_base_exceeds_both_yield_accelerations(
     assert (found == expected).where(slides, True).all()
     share = float((expected & slides).sum() / slides.sum())
     assert 0.1 < share < 0.9
-    text = solved.slides_back_text(result)
-    assert text.startswith(f"in {solved.percent(share)} of the sliding cells the base's")
+    text = slides_back_text(result)
+    assert text.startswith(f"in {percent(share)} of the sliding cells the base's")
 
 
 def test_nothing_is_said_where_it_is_not_known_or_not_so() -> None:
@@ -104,7 +104,7 @@ def test_nothing_is_said_where_it_is_not_known_or_not_so() -> None:
     stuck = slipsweep.sweep(0.0, 0.6, 4.905, 5.0)
     both = slipsweep.sweep(**FLOOR, model="newmark").assign_attrs(sliding="both")
     for result in (steep, ky, stuck, both):
-        assert solved.slides_back_text(result) == ""
+        assert slides_back_text(result) == ""
 
 
 def test_a_wave_that_drives_upslope_less_than_downslope_is_taken_by_its_trough() -> None:

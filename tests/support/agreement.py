@@ -119,7 +119,7 @@ class Group:
 
 @dataclass(frozen=True)
 class Comparison:
-    """One cell solved in two ways: the difference of the results over its bound (agreed: 1 at most)."""
+    """Difference of a cell solved in two ways, over its bound: 1 at most if they agree."""
 
     kind: str
     regime: str
@@ -258,12 +258,12 @@ def _sweep(cells: dict[str, Array], options: dict[str, Any]) -> Found:
         name: xr.DataArray(values, dims=("move", "cell")[-values.ndim :])
         for name, values in cells.items()
     }
-    found = slipsweep.sweep(**columns, **choices(**options))
-    return {str(name): found[name].to_numpy() for name in found.data_vars}
+    result = slipsweep.sweep(**columns, **choices(**options))
+    return {str(name): result[name].to_numpy() for name in result.data_vars}
 
 
 def exact_of(group: Group, size: float) -> Found:
-    """What the cycle solver says of the cells, row 0, and of each with all its inputs moved up or down by `size`."""
+    """Results of the cycle solver: the cells in row 0, below with all inputs moved by ± `size`."""
     generator = np.random.default_rng(group.seed % 2**32)
     # any two of the inputs, of which there are eight at most, move in the same direction in half of
     # the moves
@@ -277,7 +277,7 @@ def exact_of(group: Group, size: float) -> Found:
 
 
 def _outcome(mode: Any, validity: Any) -> tuple[int, int]:
-    """Mode and validity, but for `UPSLOPE`: the sign of a displacement, which may be 0 but for roundings."""
+    """Mode and validity without `UPSLOPE`, which rounding may raise where a displacement is 0."""
     return int(mode), int(validity) & ~int(Validity.UPSLOPE)
 
 
@@ -286,7 +286,7 @@ def _judged(
     group: Group,
     exact: Found,
     j: int,
-    found: dict[str, Any],
+    results: dict[str, Any],
     coarse: dict[str, float] | None = None,
     **solver: Any,
 ) -> Comparison:
@@ -296,25 +296,25 @@ def _judged(
     other one comes to over the shaking, or a thousandth of what the plane does, if that is more.
     To the bound comes how far the neighbours are.
     """
-    own = {name: values[0, j] for name, values in exact.items()}
-    mode = int(own["sliding_mode"])
+    exact_of_cell = {name: values[0, j] for name, values in exact.items()}
+    mode = int(exact_of_cell["sliding_mode"])
     arguments = group.cell(j) | group.options | solver
     # the call that repeats a cell, in the words of `cases.choices`
     text = ", ".join(f"{key}={value!r}" for key, value in arguments.items())
     text = f"seed {group.seed}, {group.regimes[j]}: {text}"
-    outcome = _outcome(found["sliding_mode"], found["validity"])
+    outcome = _outcome(results["sliding_mode"], results["validity"])
     if outcome not in map(_outcome, exact["sliding_mode"][:, j], exact["validity"][:, j]):
         return Comparison(
             kind, group.regimes[j], mode, math.inf, math.inf, f"{text}: mode and validity {outcome}"
         )
     valued = not outcome[1] & VALUELESS
-    if valued != all(math.isfinite(found[name]) for name in MOTION):
-        return Comparison(kind, group.regimes[j], mode, math.inf, math.inf, f"{text}: {found}")
-    if not valued or own["validity"] & VALUELESS:
+    if valued != all(math.isfinite(results[name]) for name in MOTION):
+        return Comparison(kind, group.regimes[j], mode, math.inf, math.inf, f"{text}: {results}")
+    if not valued or exact_of_cell["validity"] & VALUELESS:
         return Comparison(kind, group.regimes[j], mode, 0.0, 0.0, text)
     difference = 0.0
     times = 0.0
-    u, v = (abs(float(own[name])) for name in MOTION)
+    u, v = (abs(float(exact_of_cell[name])) for name in MOTION)
     period = 1.0 / float(group.cells["frequency"][j])
     cycles = group.options["cycles"]
     pushed = group.amplitude(j) * period
@@ -327,11 +327,11 @@ def _judged(
             max(v, u / (period * cycles), pushed),
         )
     for name, scale, least in zip(MOTION, scales, nothing, strict=True):
-        apart = abs(float(found[name]) - own[name])
+        apart = abs(float(results[name]) - exact_of_cell[name])
         if apart == 0.0:
             continue
         # those that have a value
-        moved = float(np.nanmax(np.abs(exact[name][:, j] - own[name]))) + least
+        moved = float(np.nanmax(np.abs(exact[name][:, j] - exact_of_cell[name]))) + least
         bound = FLOORS[kind] * scale + moved
         if kind.startswith("step") and group.regimes[j] == "sharp":
             # friction may decay in a layer that is thinner than a step: seen less accurately
@@ -342,7 +342,7 @@ def _judged(
             bound = min(bound, 0.5 * coarse[name] + 1e-3 * FLOORS[kind] * scale + moved)
         difference = max(difference, apart / scale)
         times = max(times, apart / bound)
-        text += f"; {name} {float(found[name])!r}, cycle solver {float(own[name])!r}"
+        text += f"; {name} {float(results[name])!r}, cycle solver {float(exact_of_cell[name])!r}"
     return Comparison(kind, group.regimes[j], mode, difference, times, text)
 
 
@@ -355,18 +355,18 @@ def _stepped(group: Group, exact: Found) -> Iterator[Comparison]:
         for more in (0, 44, 92)
     ]
     fine = group.steps * FINER[group.rule]
-    found = _sweep(group.cells, options | {"steps_per_cycle": fine})
+    results = _sweep(group.cells, options | {"steps_per_cycle": fine})
     for j in range(len(group.regimes)):
         coarse = {
             name: max(abs(run[name][j] - exact[name][0, j]) for run in runs) for name in MOTION
         }
-        own = {name: values[j] for name, values in found.items()}
+        of_cell = {name: values[j] for name, values in results.items()}
         yield _judged(
             f"step, {group.rule}",
             group,
             exact,
             j,
-            own,
+            of_cell,
             coarse,
             solver="step",
             rule=group.rule,
@@ -375,7 +375,7 @@ def _stepped(group: Group, exact: Found) -> Iterator[Comparison]:
 
 
 def _histories(group: Group, exact: Found) -> Iterator[Comparison]:
-    """`simulate`: its end, and the largest velocity of the samples; of cells that slide on into the next pulse, too."""
+    """Last displacement and largest velocity of `simulate`, also for continuous sliding."""
     cycles = group.options["cycles"]
     carried = [
         j for j in range(len(group.regimes)) if exact["validity"][0, j] & Validity.NOT_RECOUPLED
@@ -389,17 +389,19 @@ def _histories(group: Group, exact: Found) -> Iterator[Comparison]:
         times = np.arange(min(cycles, 20) * 256 * group.fastest + 1) * spacing
         times = np.union1d(times, shaken - times) if cycles > 20 else times
         history = slipsweep.simulate(**arguments, times=np.append(times, 1e12 * shaken))
-        found = {name: history[name].item() for name in ("sliding_mode", "validity")}
-        found[MOTION[0]] = history.relative_displacement.to_numpy()[-1]
+        codes = {name: history[name].item() for name in ("sliding_mode", "validity")}
+        codes[MOTION[0]] = history.relative_displacement.to_numpy()[-1]
         highest = history.relative_velocity.to_numpy().max()
-        own = exact[MOTION[1]][0, j]
+        displacement = exact[MOTION[1]][0, j]
         # between two samples V may be larger than at either; of a slip that lies between them no
         # sample knows
         ground = history.ground_acceleration.to_numpy()
         relative = np.abs(ground - history.block_acceleration.to_numpy())
         rate = 2.0 * max(relative.max(), np.abs(np.diff(ground)).max())
-        found[MOTION[1]] = own if highest <= own <= highest + rate * spacing else highest
-        yield _judged("simulate", group, exact, j, found)
+        codes[MOTION[1]] = (
+            displacement if highest <= displacement <= highest + rate * spacing else highest
+        )
+        yield _judged("simulate", group, exact, j, codes)
 
 
 def _by_reference(group: Group, exact: Found) -> Iterator[Comparison]:

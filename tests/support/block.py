@@ -1,4 +1,4 @@
-"""The block of the multiple-precision reference: Eqs. 2-6 and the motion rules of one section after the other."""
+"""Block of the multiple-precision reference: Eqs. 2-6 and the motion rules, section by section."""
 
 from itertools import pairwise
 from typing import Any
@@ -40,10 +40,10 @@ class Interface:
         return ground - self.relative_acceleration(ground)
 
     def monotone_pieces(self, slope: Function, low: mpfr, high: mpfr) -> list[mpfr]:
-        """Ends of the pieces of [low, high], on one side of zero, on which a function of Eq. 4 is monotone.
+        """Ends of the pieces of [low, high] on which a function of Eq. 4 is monotone.
 
-        The slope of Eq. 4 is itself monotone on either side of one inflection, where n lambda / g =
-        2 tan(theta).
+        Low and high are on the same side of zero.  The slope of Eq. 4 is itself monotone on either
+        side of one inflection, where n lambda / g = 2 tan(theta).
         """
         cuts = [low, high]
         if self.tan_theta > 0 and self.decay > 0:
@@ -77,7 +77,7 @@ class NoValueError(Exception):
 
 
 class Block:
-    """The state of the block, and the motion rules of one section of the shaking after the other."""
+    """State of the block, and the motion rules, section by section of the shaking."""
 
     def __init__(self, model: str, rise: str, recoupling: str) -> None:
         self.newmark = model == "newmark"
@@ -104,7 +104,10 @@ class Block:
     # ------------------------------------------------------------------ motion with a given b
 
     def go(self, section: Section, start: mpfr, end: mpfr, held: mpfr | None) -> mpfr:
-        """Slide with b held, or by Eq. 4 (None), where Üg − b is of one sign; where the block stops, or end."""
+        """Slide with b held, or by Eq. 4 (None), to the stop or to `end`, and return that.
+
+        Üg − b is of one sign.
+        """
         decay = self.interface.decay if held is None else mpfr(0)
 
         def rate(x: mpfr) -> mpfr:
@@ -122,7 +125,7 @@ class Block:
         return stop
 
     def stop(self, section: Section, low: mpfr, high: mpfr, rate: Function, decay: mpfr) -> mpfr:
-        """Where the velocity, which falls from low to high, is zero (Newton kept in its bracket)."""
+        """Return the zero of the velocity, which falls from low to high (Newton in its bracket)."""
         phi = low
         velocity = self.v
         tiny = (high - low) * mpfr(10) ** (10 - decimals())

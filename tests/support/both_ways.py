@@ -174,7 +174,7 @@ def conditioning(cell: Cell) -> tuple[tuple[mpfr, ...], list[mpfr]]:
     others = [solve(other) for other in neighbours(cell)]
     with workdps(DIGITS + GUARD):
         columns = zip(*others, strict=True)
-        bounds = [bound_of(own, moved) for own, moved in zip(results, columns, strict=True)]
+        bounds = [bound_of(result, moved) for result, moved in zip(results, columns, strict=True)]
     return results, bounds
 
 
@@ -350,7 +350,7 @@ def solve_by_package(cell: Cell) -> tuple[float, ...]:
     shaking: dict[str, Any] = {"scale": cell.amplitude}
     if not cell.samples:
         shaking = {"amplitude": cell.amplitude, "frequency": 1.0 / (2.0 * math.pi)}
-    found = sweep(
+    solution = sweep(
         0.0,
         0.1,
         **shaking,
@@ -360,4 +360,4 @@ def solve_by_package(cell: Cell) -> tuple[float, ...]:
         model=Newmark(sliding="both"),
         variables=RESULTS,
     )
-    return tuple(float(found[name]) for name in RESULTS)
+    return tuple(float(solution[name]) for name in RESULTS)

@@ -1,8 +1,10 @@
-"""Chromium, and what a user does in a page of `slipsweep explore`."""
+"""Actions of a user in a page of `slipsweep explore`, in Chromium."""
 
 import json
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 
 def wait_for(driver: Any, script: str) -> Any:
@@ -12,8 +14,11 @@ def wait_for(driver: Any, script: str) -> Any:
     return WebDriverWait(driver, 60, 0.05).until(lambda d: d.execute_script(f"return {script}"))
 
 
-#: A function of the page's: a model of Bokeh by its name.
-FOUND = "const found = (name) => Bokeh.documents.map((one) => one.get_model_by_name(name)).find(Boolean);"
+#: A function for scripts: a model of Bokeh by its name.
+MODEL = (
+    "const model = (name) =>"
+    " Bokeh.documents.map((figure) => figure.get_model_by_name(name)).find(Boolean);"
+)
 
 
 def move(driver: Any, theta: int, mu_s: int) -> None:
@@ -27,14 +32,14 @@ def move(driver: Any, theta: int, mu_s: int) -> None:
 
 
 def point(driver: Any, x: float, y: float, click: bool = False) -> None:
-    """Put the pointer on a place of the map, in shares of its width and height from the upper left."""
+    """Put the pointer on the map, at shares of its width and height from the upper left."""
     from selenium.webdriver import ActionChains
     from selenium.webdriver.common.by import By
 
     host = driver.find_element(By.ID, "map")
     driver.execute_script("arguments[0].scrollIntoView({block: 'center'})", host)
     frame = driver.execute_script(
-        FOUND + "const m = found('map'); const b = Bokeh.index.find_one(m).frame.bbox;"
+        MODEL + "const b = Bokeh.index.find_one(model('map')).frame.bbox;"
         "return [b.left, b.top, b.width, b.height]"
     )
     left = frame[0] + x * frame[2] - host.size["width"] / 2
@@ -45,24 +50,41 @@ def point(driver: Any, x: float, y: float, click: bool = False) -> None:
     (actions.click() if click else actions).perform()
 
 
-def text_of(driver: Any, name: str) -> str:
-    text = driver.execute_script("return document.getElementById(arguments[0]).textContent", name)
+def text_of(driver: Any, element: str) -> str:
+    """Text of an element, with plain spaces."""
+    script = "return document.getElementById(arguments[0]).textContent"
+    text = driver.execute_script(script, element)
     return str(text).replace("\u00a0", " ")
 
 
 def chosen(driver: Any, element: str = "readout") -> Any:
-    """The index of the cell that an element is of."""
-    return json.loads(
-        driver.execute_script("return document.getElementById(arguments[0]).dataset.index", element)
+    """Index of the cell that an element shows."""
+    script = "return document.getElementById(arguments[0]).dataset.index"
+    return json.loads(driver.execute_script(script, element))
+
+
+def image_of_map(driver: Any) -> np.ndarray:
+    """Numbers that give the pixels of the map their colours, row by row from below."""
+    script = "const image = model('colours').data.image[0]; return [image.shape, [...image]]"
+    shape, values = driver.execute_script(MODEL + script)
+    return np.reshape(np.array(values, float), shape)
+
+
+def choose_layer(driver: Any, place: int) -> None:
+    """Choose the result that colours the map."""
+    driver.execute_script(
+        "const list = document.getElementById('layer'); list.selectedIndex = arguments[0];"
+        "list.dispatchEvent(new Event('change'))",
+        place,
     )
 
 
 def show(driver: Any, path: Path, width: int = 1340) -> None:
-    """Open a page in a window of some width; narrow ones are phones."""
+    """Open a page in a window of some width, px; narrow ones are phones."""
     driver.execute_cdp_cmd(
         "Emulation.setDeviceMetricsOverride",
         {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500},
     )
     driver.get(path.as_uri())
     wait_for(driver, "document.body.dataset.ready")
-    wait_for(driver, "Bokeh.documents.every((one) => one.is_idle)")
+    wait_for(driver, "Bokeh.documents.every((figure) => figure.is_idle)")

@@ -37,8 +37,9 @@ Found = tuple[float, float, int, int]
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """A line of a table of tests/data; results as printed, None for what is not given and empty for no value.
+    """Line of a table of tests/data.
 
+    Results are text as printed, empty if there is no value; an input is None if it is not given.
     The bounds are of hard cases: how far the answer moves, in m and m/s, and the (mode, validity)
     within one ulp of it.
     """
@@ -92,15 +93,18 @@ class Case:
 
     @property
     def uplift(self) -> bool:
-        """Whether A tan(theta) >= g, where the model gives no value (cases.csv has one such line)."""
+        """True if A tan(theta) >= g: the model gives no value (cases.csv has one such line)."""
         return (
             self.model == "mendez" and self.amplitude * math.tan(math.radians(self.theta)) >= self.g
         )
 
-    def missed(self, found: Found, relative: float, absolute: float = 1e-12) -> str:
-        """What is wrong with an answer beyond relative |u| + absolute A/omega**2, likewise for v; "" if nothing is."""
+    def missed(self, answer: Found, relative: float, absolute: float = 1e-12) -> str:
+        """Return a message if u differs by more than relative |u| + absolute A/omega**2, else "".
+
+        Likewise v, with A/omega.
+        """
         for value, exact, scale in zip(
-            found,
+            answer,
             (self.permanent_displacement, self.peak_relative_velocity),
             (self.displacement_scale, self.velocity_scale),
             strict=False,
@@ -109,16 +113,16 @@ class Case:
                 return f"case {self}: {value!r}, not {exact}"
         return ""
 
-    def times_bounds(self, found: Found) -> tuple[float, float]:
+    def times_bounds(self, answer: Found) -> tuple[float, float]:
         """Errors of displacement and peak velocity in units of the conditioning bounds."""
         exact = (self.permanent_displacement, self.peak_relative_velocity)
         bounds = (self.displacement_bound, self.velocity_bound)
-        one, other = (_times(*each) for each in zip(found, exact, bounds, strict=False))
+        one, other = (_times(*each) for each in zip(answer, exact, bounds, strict=False))
         return one, other
 
 
 def _times(answer: float, exact: str, bound: str) -> float:
-    """|answer − exact| / bound in decimals: any of them may be subnormal; NaN counts as infinitely far."""
+    """|answer − exact| / bound, infinite for NaN; in decimals, as each may be subnormal."""
     if not math.isfinite(answer):
         return math.inf
     with localcontext(prec=60):
@@ -140,28 +144,29 @@ def _value(kind: Any, text: str) -> Any:
     return int(text) if kind is int else text if kind is str else float(text)
 
 
-def choices(**given: Any) -> dict[str, Any]:
-    """Arguments of `slipsweep.sweep` from options as tables of cases have them, each in a column of its own.
-
+def choices(**columns: Any) -> dict[str, Any]:
+    """Arguments of `slipsweep.sweep` from options in the columns of a table of cases.
     A column that does not go with a row's model, waveform or solver is left out; where a row has
     no option of a model, a waveform or a solver, the function's own default stays.
     """
-    harmonics = given.pop("harmonics", None)
+    harmonics = columns.pop("harmonics", None)
     if isinstance(harmonics, str) and harmonics:
         terms = [(*map(float, term.split(":")), 0.0) for term in harmonics.split(",")]
         harmonics = {"amplitudes": [t[0] for t in terms], "multiples": [t[1] for t in terms]}
         harmonics["phases"] = [t[2] for t in terms]
-    given |= dict(harmonics or {})
+    columns |= dict(harmonics or {})
     for family in (MODELS, WAVEFORMS, SOLVERS):
-        if not given.keys() & {family.attribute, *family.options}:
+        if not columns.keys() & {family.attribute, *family.options}:
             continue
-        name = given.pop(family.attribute, family.default)
-        options = {option: given.pop(option) for option in family.options if option in given}
+        name = columns.pop(family.attribute, family.default)
+        options = {option: columns.pop(option) for option in family.options if option in columns}
         if name in family.names:
-            known = {one.name for one in declared(family.called(name))}
-            name = family.made(name, {key: value for key, value in options.items() if key in known})
-        given.setdefault(family.keyword, name)  # a name of none is refused where it arrives
-    return given
+            declared_names = {each.name for each in declared(family.called(name))}
+            name = family.made(
+                name, {key: value for key, value in options.items() if key in declared_names}
+            )
+        columns.setdefault(family.keyword, name)  # a name of none is refused where it arrives
+    return columns
 
 
 def solve(cases: Iterable[Case], **options: Any) -> dict[int, Found]:
@@ -173,7 +178,7 @@ def solve(cases: Iterable[Case], **options: Any) -> dict[int, Found]:
             *(getattr(case, name) is None for name in OPTIONAL_INPUTS),
         )
 
-    found: dict[int, Found] = {}
+    answers: dict[int, Found] = {}
     for _, alike in groupby(sorted(cases, key=key), key):
         group = list(alike)
         columns: dict[str, Any] = {
@@ -184,5 +189,5 @@ def solve(cases: Iterable[Case], **options: Any) -> dict[int, Found]:
         result = slipsweep.sweep(**choices(**columns, **shared | options))
         names = ("permanent_displacement", "peak_relative_velocity", "sliding_mode", "validity")
         rows = zip(*(result[name].values.tolist() for name in names), strict=True)
-        found |= {case.case: row for case, row in zip(group, rows, strict=True)}
-    return found
+        answers |= {case.case: row for case, row in zip(group, rows, strict=True)}
+    return answers

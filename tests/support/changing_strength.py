@@ -1,7 +1,7 @@
 """Newmark's block whose strength changes while it slides, by SciPy's integrator with events.
 
-It shares no code with the kernels: the base's acceleration is a function between breaks, at which it
-or its slope jumps and between which it is monotone.
+It shares no code with the kernels: the base's acceleration is a function between breaks, at which
+it or its slope jumps and between which it is monotone.
 """
 
 from collections.abc import Callable, Sequence
@@ -91,8 +91,8 @@ def record_pieces(times: np.ndarray, acceleration: np.ndarray) -> list[Piece]:
     """Lines between samples, cut where they pass zero."""
     pieces = []
     for k in range(times.size - 1):
-        first, last = float(acceleration[k]), float(acceleration[k + 1])
-        start, end = float(times[k]), float(times[k + 1])
+        first, last = acceleration[k : k + 2].tolist()
+        start, end = times[k : k + 2].tolist()
         slope = (last - first) / (end - start)
 
         def ground(
@@ -136,7 +136,8 @@ class _Walk:
         """Return the time at which the block at rest begins to slide."""
         down = self.block.downslope(0.0, self.s)
         up = self.block.upslope(0.0, self.s)
-        first, last = piece.ground(time), piece.ground(piece.end)
+        first = piece.ground(time)
+        last = piece.ground(piece.end)
         if first > down or first < -up:
             self.way = 1 if first > down else -1
             return time
@@ -154,7 +155,8 @@ class _Walk:
         block = self.block
 
         def slope(t: float, state: np.ndarray) -> tuple[float, float]:
-            speed, slip = abs(state[0]), self.s + way * (state[1] - self.u)
+            speed = abs(state[0])
+            slip = self.s + way * (state[1] - self.u)
             braking = block.downslope(speed, slip) if way > 0 else -block.upslope(speed, slip)
             return piece.ground(t) - braking, state[0]
 
@@ -192,7 +194,8 @@ class _Walk:
         for state in solution.y_events[1]:
             self.fastest = max(self.fastest, float(state[0]))
         self.fastest = max(self.fastest, v)
-        self.v, self.u = v, u
+        self.v = v
+        self.u = u
         if solution.t_events[0].size:
             self.v = 0.0
             self.way = 0

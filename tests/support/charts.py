@@ -60,7 +60,7 @@ def _contains(path: Outline, points: Any) -> Any:
 
 
 def drawn_as(figure: Figure, text: str) -> list[Any]:
-    """Lines of a chart's first axes that look as an entry of the legend: colour, dash and marker."""
+    """Lines of the first axes with the colour, dash and marker of an entry of the legend."""
     texts = [entry.get_text() for entry in figure.legends[0].get_texts()]
     entry = figure.legends[0].legend_handles[texts.index(text)]
     return [line for line in figure.axes[0].lines if _look(line) == _look(entry)]

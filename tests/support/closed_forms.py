@@ -1,4 +1,4 @@
-"""Newmark's block in closed form: permanent displacement over A T² of one cycle of each wave, and of a pulse.
+"""Newmark's block in closed form: permanent displacement over A T² of a cycle of each wave.
 
 r = Üy/A is from 0 to 1.  The block slides while its velocity v is positive: from w = r on at the
 rate w − r, in units of A, to the root of v; w is the wave and s = t/T.  It always stops within the
@@ -11,7 +11,7 @@ mp.dps = 30
 
 
 def rectangle(r: mpf) -> mpf:
-    """A rectangular pulse of duration T and base velocity V = A T: (V²/2N)(1 − N/A), N = Üy (Newmark 1965)."""
+    """A rectangular pulse of duration T: (V²/2Üy)(1 − Üy/A) with V = A T (Newmark 1965)."""
     return (1 - r) / (2 * r)
 
 
@@ -36,7 +36,7 @@ def sine(r: mpf) -> mpf:
 
 
 def triangle(r: mpf) -> mpf:
-    """(3 + 2√2)/48 (1 − r)³ where the block stops on the falling line, r ≥ 3 − 2√2; else behind it."""
+    """(3 + 2√2)/48 (1 − r)³ if the block stops on the falling line, r ≥ 3 − 2√2; else behind it."""
     if r >= 3 - 2 * mp.sqrt(2):
         return (3 + 2 * mp.sqrt(2)) / 48 * (1 - r) ** 3
     # v and u where the wave is −1, s = 3/4; then w = 4 y − 1 up to the stop, y later

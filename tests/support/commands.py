@@ -27,8 +27,8 @@ def run_command(*arguments: object) -> Ended:
     """Run a command to its end in this process."""
     written = [io.BytesIO(), io.BytesIO()]
     streams = [
-        io.TextIOWrapper(one, "utf-8", errors="surrogateescape", write_through=True)
-        for one in written
+        io.TextIOWrapper(name, "utf-8", errors="surrogateescape", write_through=True)
+        for name in written
     ]
     words = [str(argument) for argument in arguments]
     with (
@@ -37,7 +37,7 @@ def run_command(*arguments: object) -> Ended:
         mock.patch.object(sys, "argv", ["slipsweep", *words]),  # which a result's history tells
     ):
         status = main(words)
-    output, errors = (one.getvalue().decode(errors="surrogateescape") for one in written)
+    output, errors = (name.getvalue().decode(errors="surrogateescape") for name in written)
     return Ended(status, output, errors)
 
 
@@ -64,7 +64,7 @@ def slipsweep(
     environment: Mapping[str, str] | None = None,
     preexec_fn: Callable[[], object] | None = None,
 ) -> "subprocess.CompletedProcess[str]":
-    """Run a command in `folder` as a process, with `environment` on top of this one's, and wait for it."""
+    """Run a command in `folder` as a process, with `environment` added to this one's."""
     return subprocess.run(
         [*SLIPSWEEP, *map(str, arguments)],
         cwd=folder,

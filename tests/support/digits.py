@@ -1,4 +1,4 @@
-"""Decimal digits for gmpy2, which counts bits: MPFR, ten times as fast as what mpmath does in Python."""
+"""Decimal digits for gmpy2, which counts bits: MPFR is ten times as fast as mpmath."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -52,7 +52,7 @@ OUTPUTS = ("out.nc", "out.zarr")
 #: Processes begin as copies of one that has imported what the command needs.
 _PROCESSES = multiprocessing.get_context("forkserver")
 _PROCESSES.set_forkserver_preload(
-    ["slipsweep.cli.run", "slipsweep.charts.solved", "dask.array", "pint", "zarr", __name__]
+    ["slipsweep.cli.run", "slipsweep.studies.cautions", "dask.array", "pint", "zarr", __name__]
 )
 
 
@@ -65,11 +65,11 @@ class Started:
 
     @property
     def has_ended(self) -> bool:
-        """Whether it has."""
+        """True if the process has ended."""
         return self.process.exitcode is not None
 
     def finished(self, status: int | None = 0) -> str:
-        """What it has said on standard error; it must end with a status, and never with a traceback."""
+        """Wait for the end, with a status and without a traceback; return the standard error."""
         self.process.join(900)  # kernels may have to be compiled
         errors = self.errors.read_text()
         assert "Traceback" not in errors, errors
@@ -78,7 +78,7 @@ class Started:
 
 
 def start(folder: Path, *arguments: str, cells: int = 25_000, limit: int | None = None) -> Started:
-    """Start `slipsweep` in a folder, in chunks of so many cells; no file may become larger than `limit`."""
+    """Start `slipsweep` in a folder, in chunks of `cells`; files may grow to `limit` bytes."""
     errors = folder / f"errors-{secrets.token_hex(4)}"
     process = _PROCESSES.Process(target=_run, args=(folder, arguments, cells, limit, errors))
     process.start()
@@ -149,7 +149,7 @@ def hurt(
 
 
 def full_disk(folder: Path, output: str, whole: bytes, chance: random.Random) -> None:
-    """No room left while chunks are written, on a disk of its own; where none can be had, files may not grow."""
+    """Fill a disk while chunks are written; if none can be mounted, limit the size of files."""
     output = f"disk/{output}"
     disk = folder / "disk"
     rest = chance.randint(0, 200_000)
@@ -222,7 +222,7 @@ def edited(folder: Path, output: str, whole: bytes, chance: random.Random) -> No
 
 
 def damaged(folder: Path, output: str, whole: bytes, chance: random.Random) -> None:
-    """A result with a part overwritten or cut off, or a file that is none, is read or refused in one line."""
+    """Read or refuse, in a line, a result with a part overwritten or cut off, or no result."""
     start(folder, "run", "a.toml", "-o", "damaged.nc", "-q", "--overwrite").finished()
     path = folder / "damaged.nc"
     content = bytearray(path.read_bytes())
@@ -289,5 +289,7 @@ def _children(pid: int) -> list[int]:
     """Processes below a process that run Python's multiprocessing: the workers."""
     children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
     return [
-        int(one) for one in children if "spawn_main" in Path(f"/proc/{one}/cmdline").read_text()
+        int(child)
+        for child in children
+        if "spawn_main" in Path(f"/proc/{child}/cmdline").read_text()
     ]

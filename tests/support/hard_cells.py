@@ -1,4 +1,4 @@
-"""The hard cases: where the model is hardest to solve, why, and what one ulp of an input does there.
+"""Cells in which the model is hardest to solve, the reason, and the effect of an ulp of an input.
 
 `CATEGORIES` makes their cells; ``python -m benchmarks.hard_cases`` solves them, and all
 their neighbours one ulp away, in multiple precision into data/hard_cases.csv.
@@ -54,7 +54,7 @@ def _ulps(value: float, count: int) -> float:
 
 
 def just_above_yield() -> Iterator[Cell]:
-    """u goes with (A − Üy)²: differences of nearly equal numbers lose all digits; the slide is shorter than a step."""
+    """u ~ (A − Üy)²: differences of nearly equal numbers; the slide is shorter than a step."""
     for theta, mu_s in PLANES:
         onset = _friction(theta, mu_s).yield_acceleration
         for k in (2, 5, 8, 11, 14):
@@ -141,8 +141,8 @@ def friction_not_decaying() -> Iterator[Cell]:
         for k in (2, 5, 8, 11, 14):
             short = (1 - mpfr(10) ** -k) / gmpy2.sqrt(mpfr(mu_s))
             yield _cell(theta, mu_s, limit * short, cycles=2)
-            given = _friction(theta, mu_s, yield_acceleration=2.0).limiting_acceleration
-            yield _cell(theta, mu_s, given * short, cycles=2, yield_acceleration=2.0)
+            limiting = _friction(theta, mu_s, yield_acceleration=2.0).limiting_acceleration
+            yield _cell(theta, mu_s, limiting * short, cycles=2, yield_acceleration=2.0)
     # beyond μs ξ² = 1 there is no value, but of Newmark's block, which slides
     limit = _friction(0.0, 1.5, yield_acceleration=2.0).limiting_acceleration
     for k in (2, 8, 14):
@@ -180,7 +180,7 @@ def tangential_onset() -> Iterator[Cell]:
     mu_s = 0.2
     onset = 1.3 * G
     amplitude = 1.4 * G
-    given = {"yield_acceleration": onset}
+    options = {"yield_acceleration": onset}
     with workdps(60):
         tangent = gmpy2.tan(gmpy2.radians(mpfr(theta)))
         g = mpfr(G)
@@ -188,14 +188,16 @@ def tangential_onset() -> Iterator[Cell]:
         excess = mu_s - tangent
         touching = mpfr("1.5")
         rate = tangent**2 / (touching * (touching * excess + tangent))
-        given["decay_rate"] = float(rate)
+        options["decay_rate"] = float(rate)
         x = (touching - 1) * g / tangent
         level = gmpy2.exp(float(rate) * x / g) * (excess + tangent / touching) - mu_s
         for k in (2, 4, 6, 8, 10, 12):
             yield _cell(
-                theta, mu_s, amplitude, **given, delta_mu=float(level * (1 - mpfr(10) ** -k))
+                theta, mu_s, amplitude, **options, delta_mu=float(level * (1 - mpfr(10) ** -k))
             )
-        yield _cell(theta, mu_s, amplitude, **given, delta_mu=float(level * (1 + mpfr(10) ** -12)))
+        yield _cell(
+            theta, mu_s, amplitude, **options, delta_mu=float(level * (1 + mpfr(10) ** -12))
+        )
         # or Eq. 4 falls to Üg at the very peak
         theta = 5.0
         mu_s = 0.38
@@ -254,11 +256,11 @@ def vanishing_kd() -> Iterator[Cell]:
         n = g + amplitude * tangent
         for k in (1, 3, 6, 9, 12):
             friction = mu_s - tangent - (amplitude * (1 - mpfr(10) ** -k) - g * tangent) / n
-            given = {
+            options = {
                 "decay_rate": rate,
                 "delta_mu": float(friction * gmpy2.exp(rate * amplitude / g) - mu_s),
             }
-            yield _cell(theta, mu_s, amplitude, yield_acceleration=0.59, rise="literal", **given)
+            yield _cell(theta, mu_s, amplitude, yield_acceleration=0.59, rise="literal", **options)
 
 
 def many_cycles() -> Iterator[Cell]:
@@ -339,7 +341,7 @@ def neighbours(cell: Cell) -> Iterator[Cell]:
 
 
 def bound_of(value: mpfr, others: Iterable[mpfr], dtype: str = "float64") -> mpfr:
-    """How far a result is from those of its neighbours that have one, plus half an ulp of its own."""
+    """Largest difference from the results of the neighbours, plus half an ulp of the result."""
     moves = [abs(other - value) for other in others if not gmpy2.is_nan(other)]
     return (
         max(moves, default=mpfr(0)) + mpfr(float(np.spacing(np.dtype(dtype).type(abs(value))))) / 2
@@ -347,10 +349,10 @@ def bound_of(value: mpfr, others: Iterable[mpfr], dtype: str = "float64") -> mpf
 
 
 def conditioning(cell: Cell, dtype: str = "float64") -> dict[str, str]:
-    """The reference's answer, and the bounds of displacement and peak velocity, as one input moves by one ulp."""
+    """Results of the reference, and their bounds: the effect of an ulp of an input."""
     answer = reference.solve(**cell)
     others = [reference.solve(**other) for other in neighbours(cell)]
-    found = {"sliding_mode": str(answer.sliding_mode), "validity": str(answer.validity)}
+    row = {"sliding_mode": str(answer.sliding_mode), "validity": str(answer.validity)}
     with workdps(60):
         for result, bound in (
             ("permanent_displacement", "displacement_bound"),
@@ -358,8 +360,8 @@ def conditioning(cell: Cell, dtype: str = "float64") -> dict[str, str]:
         ):
             value = getattr(answer, result)
             has_none = gmpy2.is_nan(value)
-            found[result] = "" if has_none else shown(value, 30)
+            row[result] = "" if has_none else shown(value, 30)
             moved = bound_of(value, (getattr(other, result) for other in others), dtype)
-            found[bound] = "" if has_none else shown(moved, 6)
+            row[bound] = "" if has_none else shown(moved, 6)
     outcomes = sorted({(other.sliding_mode, other.validity) for other in [answer, *others]})
-    return {**found, "outcomes": " ".join(f"{mode}:{validity}" for mode, validity in outcomes)}
+    return {**row, "outcomes": " ".join(f"{mode}:{validity}" for mode, validity in outcomes)}

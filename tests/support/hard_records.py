@@ -1,7 +1,6 @@
-"""Hard records: where the response to a recorded motion is hardest to solve, why, and what one ulp of the input does.
+"""Recorded motions to which the response is hardest to solve, and the effect of an ulp of an input.
 
-`CATEGORIES` makes the cells of Newmark's block; `conditioning` is its response, and how far that
-moves.
+`CATEGORIES` makes the cells of Newmark's block; `conditioning` is the response, and its bounds.
 """
 
 import math
@@ -22,7 +21,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Cell:
-    """Samples at an interval, or at times; the yield acceleration; and the factor on the samples."""
+    """Samples at an interval or at times, yield acceleration, and the factor on the samples."""
 
     samples: Floats
     onset: float
@@ -54,7 +53,7 @@ def solve(cell: Cell) -> RecordSolution:
 
 
 def neighbours(cell: Cell) -> Iterator[Cell]:
-    """`cell` with one of its inputs an ulp up or down; the samples, and the times, are one input each."""
+    """Cells with an input an ulp up or down; all samples are an input, and so are all times."""
     for toward in (-math.inf, math.inf):
         yield replace(cell, onset=math.nextafter(cell.onset, toward))
         yield replace(cell, scale=math.nextafter(cell.scale, toward))
@@ -69,17 +68,17 @@ def neighbours(cell: Cell) -> Iterator[Cell]:
 
 
 def conditioning(cell: Cell) -> tuple[RecordSolution, mpfr, mpfr]:
-    """The exact response, and how far displacement and peak velocity move: plus half an ulp of their own."""
-    own = solve(cell)
+    """Exact response, and bounds of displacement and peak velocity, with half an ulp of theirs."""
+    answer = solve(cell)
     others = [solve(other) for other in neighbours(cell)]
     with workdps(60):
         displacement = bound_of(
-            own.permanent_displacement, (other.permanent_displacement for other in others)
+            answer.permanent_displacement, (other.permanent_displacement for other in others)
         )
         return (
-            own,
+            answer,
             displacement,
-            bound_of(own.peak_relative_velocity, (o.peak_relative_velocity for o in others)),
+            bound_of(answer.peak_relative_velocity, (o.peak_relative_velocity for o in others)),
         )
 
 

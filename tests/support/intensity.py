@@ -10,7 +10,7 @@ _PARTS = 200
 
 
 def measures_by_sums(times: NDArray[np.float64], values: NDArray[np.float64]) -> dict[str, float]:
-    """Return all measures of accelerations (m/s²) by the definitions of the literature, "g" 9.80665 m/s²."""
+    """Return all measures of accelerations (m/s²) by their definitions, g = 9.80665 m/s²."""
     places = np.arange((times.size - 1) * _PARTS + 1) / _PARTS
     fine = np.interp(places, np.arange(times.size), times)
     acceleration = np.interp(fine, times, values)
@@ -39,7 +39,7 @@ def _integral(times: NDArray[np.float64], values: NDArray[np.float64]) -> NDArra
 
 
 def _mean_period(times: NDArray[np.float64], values: NDArray[np.float64]) -> float:
-    """Σ C²/f over Σ C² of an evenly sampled motion, from 0.25 to 20 Hz at steps of 0.05 Hz or less."""
+    """Σ C²/f over Σ C² of an evenly sampled motion, 0.25 to 20 Hz in steps of 0.05 Hz at most."""
     step = (times[-1] - times[0]) / (times.size - 1)
     samples = max(times.size, math.ceil(20.0 / step))
     frequencies = np.arange(1, samples // 2 + 1) / (samples * step)

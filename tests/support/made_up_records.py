@@ -19,7 +19,7 @@ from tests.support.reference import solve_record
 
 
 def band_noise() -> Record:
-    """Noise with a band and an envelope of earthquakes: pulses of all sizes, several maxima each."""
+    """Noise with the band and envelope of earthquakes: pulses of all sizes, of several maxima."""
     rng = np.random.default_rng(7)
     times = np.arange(0.0, 20.0, 0.01)
     phases = rng.uniform(0, 2 * np.pi, 60)
@@ -88,17 +88,23 @@ def made(seed: int) -> Made:
     return Made(Record.sampled(values, float(rng.choice([0.02, 0.05, 0.1]))), theta, mu_s, given)
 
 
-def difference(one: Made) -> float:
+def difference(motion: Made) -> float:
     """The worst relative difference from the reference; infinite where flags differ."""
-    found = sweep(one.theta, one.mu_s, **choices(**one.given, excitation=one.record))
+    result = sweep(motion.theta, motion.mu_s, **choices(**motion.given, excitation=motion.record))
     expected = vars(
-        solve_record(one.record.times, one.record.acceleration, one.theta, one.mu_s, **one.given)
+        solve_record(
+            motion.record.times,
+            motion.record.acceleration,
+            motion.theta,
+            motion.mu_s,
+            **motion.given,
+        )
     )
     valueless = int(VALUELESS) & expected["validity"]
     seen = valueless or 2047  # other flags of a block without a value say nothing
-    if (int(found.validity) ^ expected.pop("validity")) & seen:
+    if (int(result.validity) ^ expected.pop("validity")) & seen:
         return math.inf
-    pairs = [(found[name].item(), float(value)) for name, value in expected.items()]
+    pairs = [(result[name].item(), float(value)) for name, value in expected.items()]
     return (
         0.0
         if valueless

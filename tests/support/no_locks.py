@@ -21,7 +21,7 @@ class _Program(ctypes.Structure):
 
 
 def refusing_locks(error: int) -> Callable[[], None]:
-    """Return what a process calls so that `flock` fails with an error number, in it and in its children."""
+    """Return a function after whose call `flock` fails with an error, in children too."""
     if platform.system() != "Linux" or platform.machine() not in _FLOCK:
         pytest.skip("filters of system calls are Linux's")
     return functools.partial(_refuse_locks, error)

@@ -1,4 +1,4 @@
-"""Pages of `slipsweep explore`: results to make them from, and what they hold."""
+"""Pages of `slipsweep explore`: results to make them from, and their contents."""
 
 import base64
 import json
@@ -33,29 +33,29 @@ def make(folder: Path, text: str) -> Path:
 
 
 def contents(page: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """What a page says of itself, and its arrays."""
-    found = re.search(
-        r'<script type="application/json" id="meta">(.*?)</script>',
-        page.read_text(encoding="utf-8"),
-    )
-    assert found
-    meta = json.loads(found[1])
+    """Return the JSON of a page, and its arrays."""
+    text = page.read_text(encoding="utf-8")
+    element = re.search(r'<script type="application/json" id="meta">(.*?)</script>', text)
+    assert element
+    meta = json.loads(element[1])
     arrays = {}
-    for name, about in meta["arrays"].items():
-        data = zlib.decompress(base64.b64decode(about["data"]))
-        arrays[name] = np.frombuffer(data, "<" + about["dtype"]).reshape(about["shape"])
-        if law := about.get(
-            "law"
-        ):  # displacements at the first value of this dimension give all others
-            dims = [dim["name"] for dim in meta["dims"]]
-            values = np.array(meta["dims"][dims.index(law["dim"])]["values"]) ** law["power"]
-            arrays[name] = arrays[name] * values.reshape(
-                [-1 if dim == law["dim"] else 1 for dim in dims]
-            )
+    for name, packed in meta["arrays"].items():
+        data = zlib.decompress(base64.b64decode(packed["data"]))
+        values = np.frombuffer(data, "<" + packed["dtype"]).reshape(packed["shape"])
+        # displacements at 1 of a dimension give all others
+        law = packed.get("law")
+        arrays[name] = values * _factors(meta, **law) if law else values
     return meta, arrays
 
 
+def _factors(meta: dict[str, Any], dim: str, power: float) -> np.ndarray:
+    """Powers of the values along a dimension, which broadcast over all."""
+    factors = np.array(axes_of(meta)[dim]) ** power
+    return factors.reshape([-1 if other == dim else 1 for other in axes_of(meta)])
+
+
 def axes_of(meta: dict[str, Any]) -> dict[str, list[float]]:
+    """Values along the dimensions of a page."""
     return {dim["name"]: dim["values"] for dim in meta["dims"]}
 
 

@@ -1,4 +1,4 @@
-"""The motion rules in multiple precision, for every waveform and every record: nothing is shared with the solvers.
+"""Motion rules in multiple precision, for all waveforms and records, without code of the solvers.
 
 The shaking is cut into sections on which Üg is smooth, monotone and of one sign.  Every event
 (onset, switch between Eq. 4 and the held value, stop) is a bracketed root of its own condition,
@@ -141,7 +141,7 @@ def friction_parameters(
 
 
 def _remarks(ratio: mpfr, upslope: bool, governs: bool, model: str, given: dict[str, Any]) -> int:
-    """Bits of a block that slides and has a value: upslope, near the mode limit, friction estimated."""
+    """Bits of a block that slides and has a value: upslope, near mode limit, friction estimated."""
     if model == "newmark":
         return UPSLOPE * upslope
     estimated = given.get("decay_rate") is None or given.get("delta_mu") is None
@@ -180,7 +180,7 @@ def _rises(shaking: Iterable[Section], rounding: mpfr) -> Iterator[tuple[mpfr, m
 
 
 def _cycles(block: Block, wave: Waveform, amplitude: mpfr, is_continuous: bool) -> list[Section]:
-    """The motion through all cycles, those alike passed over; the sections of the cycles that differ."""
+    """Move through all cycles but those alike; return the sections of the cycles that differ."""
     shaking: list[Section] = []
     seen: list[tuple[tuple[Any, ...], int, mpfr]] = []
     n = 0
@@ -246,8 +246,7 @@ def solve(
     dps: int = 30,
     **given: Number | None,
 ) -> Solution:
-    """Response of one cell to a waveform, to `dps` digits; floats are taken at their exact binary value.
-
+    """Response of a cell to a waveform, to `dps` digits; floats have their exact binary value.
     Arguments are those of `slipsweep.sweep`; `harmonics` are "amplitude:multiple:phase in degrees,
     ...", `given` as in `friction_parameters`.  Displacement is in m, velocity in m/s; NaN where
     `validity` says that there is no value.
@@ -316,8 +315,8 @@ def _half_waves(sections: Sequence[Section]) -> Iterator[tuple[int, int, mpfr]]:
 def _cut_at_onsets(
     sections: list[Section], onset: mpfr
 ) -> tuple[list[Section], list[tuple[int, int, mpfr]]]:
-    """Sections cut where half waves first reach `onset`; first and last (exclusive) ones of these pulses, and peaks."""
-    found: list[Section] = []
+    """Sections cut at the first onset of each half wave; first, end and peak of these pulses."""
+    cut: list[Section] = []
     pulses = []
     done = 0
     for start, end, peak in _half_waves(sections):
@@ -325,15 +324,15 @@ def _cut_at_onsets(
             continue
         i = next(i for i in range(start, end) if max(sections[i].first, sections[i].last) > onset)
         i = next((k for k in range(start, i) if sections[k].first >= onset), i)
-        found += sections[done:i]
+        cut += sections[done:i]
         if sections[i].first < onset:
             second = sections[i].cut(onset)
-            found.append(replace(sections[i], end=second.start, last=onset))
+            cut.append(replace(sections[i], end=second.start, last=onset))
             sections[i] = second
-        pulses.append((len(found), len(found) + end - i, peak))
-        found = found + sections[i:end]
+        pulses.append((len(cut), len(cut) + end - i, peak))
+        cut = cut + sections[i:end]
         done = end
-    return found + sections[done:], pulses
+    return cut + sections[done:], pulses
 
 
 def solve_record(
@@ -350,7 +349,7 @@ def solve_record(
     dps: int = 20,
     **given: Number | None,
 ) -> RecordSolution:
-    """Response of one block to a record, straight between its samples (docs/records.md); `given` as in `solve`."""
+    """Response of a block to a record, straight between its samples; `given` as in `solve`."""
     with workdps(dps + GUARD_DIGITS):
         values = [mpfr(scale) * mpfr(float(a)) for a in acceleration]
         sections = sections_of_record(times, values)
@@ -419,15 +418,15 @@ def _stick_and_slip(block: Block, pulse: list[Section]) -> None:
 def _slide(
     block: Block, pulse: list[Section], after: list[Section], another: bool, peak: mpfr
 ) -> None:
-    """A continuous pulse and the negative half wave that follows; up to the next pulse if that follows at once."""
+    """Slide through a continuous pulse and the negative half wave; `another` pulse may follow."""
     block.slips += block.v == 0
     bottom = 0
     while bottom < len(after) and after[bottom].side < 0:
         bottom += 1
     way_up = after[bottom:]
     at_once = another and all(
-        one.first >= 0 and one.last > 0 and (i == 0 or one.first > 0)
-        for i, one in enumerate(way_up)
+        half_wave.first >= 0 and half_wave.last > 0 and (i == 0 or half_wave.first > 0)
+        for i, half_wave in enumerate(way_up)
     )
     for section in [*pulse, *after[: len(after) if at_once else bottom]]:
         block.follow(section)

@@ -1,4 +1,4 @@
-"""The shaking in sections on which Üg is smooth, monotone and of one sign; roots and integrals to any precision."""
+"""Shaking in sections on which Üg is smooth, monotone and of one sign; roots and integrals."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -111,7 +111,7 @@ class Section:
         return replace(self, start=self.phase(ground), first=ground)
 
     def integrals(self, rate: Function, start: mpfr, end: mpfr, decay: mpfr) -> tuple[mpfr, mpfr]:
-        """Integrals of rate(Üg) and of (end - φ) rate(Üg); `decay` is that of the friction in it, 1/(m/s²)."""
+        """Integrals of rate(Üg) and (end - φ) rate(Üg); `decay` of its friction in 1/(m/s²)."""
         rule = _gauss_legendre(30 if decay else self.nodes, decimals())
         cuts = [start, end]
         if decay:  # the friction falls by e^-8 at most over a part, until it is negligible
@@ -139,7 +139,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Waveform:
-    """A wave of peak 1 under its envelope; `harmonics` are "amplitude:multiple:phase in degrees, ..."."""
+    """A wave of peak 1 under its envelope; `harmonics`: "amplitude:multiple:phase (°), ..."."""
 
     name: str
     harmonics: str
@@ -209,7 +209,7 @@ def _unit_sections(wave: Waveform, n: int, digits: int) -> list[tuple[Any, ...]]
         4 * quarter * (mpfr(wave.ramp_in) - n),
         4 * quarter * (wave.cycles - mpfr(wave.ramp_out) - n),
     ]
-    found = []
+    sections = []
     for start, end, w, slope in pieces:
         for a, b in pairwise([start, *(kink for kink in kinks if start < kink < end), end]):
             height = mpfr(1) / scale
@@ -248,7 +248,7 @@ def _unit_sections(wave: Waveform, n: int, digits: int) -> list[tuple[Any, ...]]
                     mpfr(0) if abs(unit(phi)) < epsilon() * 2**20 else unit(phi) for phi in (x, y)
                 ]
                 shape = w if height == 1 and incline == 0 else unit
-                found.append(
+                sections.append(
                     (
                         x,
                         y,
@@ -258,7 +258,7 @@ def _unit_sections(wave: Waveform, n: int, digits: int) -> list[tuple[Any, ...]]
                         2 if straight else 12,
                     )
                 )
-    return found
+    return sections
 
 
 def _harmonic(terms: list[tuple[mpfr, int, mpfr]], phi: mpfr) -> mpfr:
@@ -276,7 +276,7 @@ def _line(at: int, rate: mpfr) -> tuple[Function, Function]:
 
 def sections_of_record(times: Any, values: Sequence[mpfr]) -> list[Section]:
     """Straight lines between the samples, cut at zero."""
-    found = []
+    sections = []
     for (t0, first), (t1, last) in pairwise(zip(times, values, strict=True)):
         length = mpfr(t1) - mpfr(t0)
         ends = [(mpfr(0), first), (length, last)]
@@ -287,5 +287,5 @@ def sections_of_record(times: Any, values: Sequence[mpfr]) -> list[Section]:
             def ground(t: mpfr, a: mpfr = a, x: mpfr = x, slope: mpfr = (y - x) / (b - a)) -> mpfr:
                 return x + slope * (t - a)
 
-            found.append(Section(a, b, x, y, ground, b - a, 2))
-    return found
+            sections.append(Section(a, b, x, y, ground, b - a, 2))
+    return sections

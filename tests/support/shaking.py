@@ -1,4 +1,4 @@
-"""Synthetic tests on a shaking table: `simulate`, sampled, with noise, digitised, and what else may befall a sensor."""
+"""Synthetic tests on a shaking table: `simulate`, sampled, with noise, drift and digitisation."""
 
 from collections.abc import Collection
 from typing import Any
@@ -8,7 +8,7 @@ import xarray as xr
 from scipy.signal import lfilter
 
 import slipsweep
-from slipsweep.motion.shaking import CHANNELS, RESPONSES
+from slipsweep.studies.calibration.shaking_test import CHANNELS, RESPONSES
 
 #: One test in either sliding mode: parameters and a motion of the table.
 STICK_SLIP: dict[str, Any] = {
@@ -64,7 +64,7 @@ SOUGHT = ("yield_acceleration", "decay_rate", "delta_mu")
 def exact(
     case: dict[str, Any], rate: float = 200.0, lead: float = 0.5, tail: float = 0.5
 ) -> xr.Dataset:
-    """What the channels of a test would be without sensors: `lead` and `tail` s of rest about the shaking."""
+    """Channels of a test without sensors' errors; `lead` and `tail` s of rest about the shaking."""
     excitation = case["excitation"]
     shaken = excitation.cycles / case["frequency"]
     times = np.arange(round((lead + shaken + tail) * rate) + 1) / rate
@@ -91,7 +91,7 @@ def measured(
     bits: int | None = 12,
     responses: Collection[str] = RESPONSES,
 ) -> xr.Dataset:
-    """A test as sensors give it: white noise of so many parts of each channel's peak, then a converter of `bits`."""
+    """Add white noise, in parts of each channel's peak, then digitise to `bits`."""
     generator = np.random.default_rng(seed)
     test = clean.copy(deep=True)
     for name in CHANNELS:
@@ -110,8 +110,7 @@ def coloured(samples: int, correlation: float, seed: int = 0) -> np.ndarray:
 
 
 def coulomb(kinetic: float, noise: float = 0.01, seed: int = 0) -> xr.Dataset:
-    """A test of a block of constant friction, static 0.38, on 6 degrees: six cycles of 2 Hz and 0.55 g.
-
+    """Test of a block of constant friction, static 0.38, on 6 degrees: six cycles, 2 Hz, 0.55 g.
     Integrated in steps of 1/8000 s, independently of the solvers.
     """
     rate = 200

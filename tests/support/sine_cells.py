@@ -1,4 +1,4 @@
-"""Cells under a sine solved twice, thousands at once: in SIMD batches, and from event to event as under any wave.
+"""Cells under a sine solved twice: in SIMD batches, and from event to event as under any wave.
 
 `tests/kernels/test_agreement.py` does so for some sweeps, ``python -m benchmarks.agreement`` for
 many.
@@ -44,7 +44,7 @@ class Drawn:
     cells: dict[str, Array]
 
     def swept(self, cells: dict[str, Array], walked: bool = True) -> xr.Dataset:
-        """The cells, or some of them; a sine that is called a harmonic takes the walk of all waves."""
+        """Sweep of cells; a sine declared as a harmonic takes the walk of all waves."""
         columns: dict[str, Any] = {
             name: xr.DataArray(values, dims="cell") for name, values in cells.items()
         }
@@ -62,7 +62,7 @@ class Drawn:
 
 
 def drawn(seed: int, count: int) -> Drawn:
-    """Cells of all modes, with slides and modes that are only just reached, and with friction given or estimated."""
+    """Cells of all modes, some only just reached, with friction given or estimated."""
     rng = np.random.default_rng(seed)
 
     def between(low: float, high: float) -> Array:
@@ -93,26 +93,28 @@ def drawn(seed: int, count: int) -> Drawn:
     )
 
 
-def times_bound(one: Drawn) -> Array:
-    """Of each cell how far the two ways differ over the bound, in displacement or largest velocity: 1 at most."""
-    batches = one.swept(one.cells, walked=False)
-    walk = one.swept(one.cells)
-    drives = one.cells["amplitude"] + G * (one.cells["mu_s"] + one.cells.get("delta_mu", 0.0))
+def times_bound(cells: Drawn) -> Array:
+    """Difference of the two ways over its bound, of displacement or largest velocity, by cell."""
+    batches = cells.swept(cells.cells, walked=False)
+    walk = cells.swept(cells.cells)
+    drives = cells.cells["amplitude"] + G * (cells.cells["mu_s"] + cells.cells.get("delta_mu", 0.0))
     scales = {
         "permanent_displacement": drives / (2 * np.pi) ** 2,
         "peak_relative_velocity": drives / (2 * np.pi),
     }
     times = np.where(batches.validity.values == walk.validity.values, 0.0, np.inf)
     for name, scale in scales.items():
-        found = batches[name].values
+        displacement = batches[name].values
         right = walk[name].values
         apart = np.where(
-            np.isnan(found) == np.isnan(right), np.nan_to_num(np.abs(found - right)), np.inf
+            np.isnan(displacement) == np.isnan(right),
+            np.nan_to_num(np.abs(displacement - right)),
+            np.inf,
         )
-        bound = FLOOR * np.nan_to_num(np.abs(right)) + ROUNDING * one.cycles**2 * scale
+        bound = FLOOR * np.nan_to_num(np.abs(right)) + ROUNDING * cells.cycles**2 * scale
         (beyond,) = np.nonzero(np.isfinite(apart) & (apart > bound))
         if beyond.size:
-            bound[beyond] += TIMES * _spread(one, beyond, name, right[beyond])
+            bound[beyond] += TIMES * _spread(cells, beyond, name, right[beyond])
         times = np.maximum(times, apart / bound)
     return times
 

@@ -1,11 +1,14 @@
-"""`Dataset.slipsweep`: what the command line draws, from a dataset; importing this module registers it with xarray."""
+"""`Dataset.slipsweep`: charts and flags of a result.
+
+Importing this module registers the accessor with xarray.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Literal
 
 import xarray as xr
 
-from slipsweep.studies.decoding import flags
+from slipsweep.studies.flags import flags
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -80,7 +83,7 @@ class SlipsweepAccessor:
         panels : sequence of str
             One or two axes to draw panels over, across and down.
         variable : str
-            What contours and families show.
+            Result that contours and families show.
         levels : sequence of float or str
             Contours, in the variable's own unit or as texts with another ("5cm"); of a suite's
             fragility the displacements to exceed.
@@ -110,7 +113,7 @@ class SlipsweepAccessor:
         Returns
         -------
         matplotlib.figure.Figure or matplotlib.axes.Axes
-            The figure: write it with `savefig`; a notebook shows it.  With `ax`, that.
+            The figure: write it with `savefig`; a notebook shows it.  With `ax`, these axes.
 
         Raises
         ------

@@ -10,20 +10,21 @@ from slipsweep.charts.sheet import Panel, Sheet
 from slipsweep.charts.style import Floats, Look
 from slipsweep.errors import InputError
 from slipsweep.model.parameters import GRAVITY
+from slipsweep.model.units import in_mm
 from slipsweep.published import EQUATIONS, Estimate
 from slipsweep.studies.published_statistics import conditions_texts, estimates
 from slipsweep.studies.published_strength import strength_by
 
-#: Kinds of charts that draw them.
+#: Kinds of charts that draw published equations.
 KINDS = ("curve", "dimensionless", "motions", "intensity", "strength")
 
 #: Equations for N cycles of a period, which the dimensionless chart draws.
-NORMALISED = tuple(name for name, one in EQUATIONS.items() if "cycles" in one.inputs)
+NORMALISED = tuple(name for name, equation in EQUATIONS.items() if "cycles" in equation.inputs)
 
 #: Most equations that a chart can tell apart.
 _MOST = 5
 
-#: Colour, dash and marker of each: told apart without colour.
+#: Colour, dash and marker of each equation: told apart without colour.
 _COLOURS = ("#A8480A", "#1B7F5C", "#7B4FA0", "#444444", "#B0882A")
 _DASHES = (
     (0, (6, 2)),
@@ -57,7 +58,7 @@ def draw_over_axis(sheet: Sheet, panel: Panel) -> None:
     each = estimates(panel.data, names, sheet.options.magnitude)
     drawn = {}
     for name, estimate in each.items():
-        for dim in (one for one in estimate.median.dims if one != panel.x):
+        for dim in (other for other in estimate.median.dims if other != panel.x):
             raise InputError(f"--equations: {name} varies along {dim}: choose a value with --at")
         drawn[name] = _along(estimate, panel.data[panel.x])
     _draw_each(sheet, panel, panel.xs, drawn)
@@ -117,7 +118,7 @@ def draw_normalised(sheet: Sheet, panel: Panel) -> None:
     attrs = {**panel.data.attrs, "g": GRAVITY}
     coords = {"yield_coefficient": ("place", 1.0 / over_yield), **unit}
     each = estimates(xr.Dataset(coords=coords, attrs=attrs), names, sheet.options.magnitude)
-    drawn = {name: Estimate(*(part.values for part in one)) for name, one in each.items()}
+    drawn = {name: Estimate(*(part.values for part in estimate)) for name, estimate in each.items()}
     _draw_each(sheet, panel, over_yield, drawn, (2.0 * np.pi) ** 2 / GRAVITY)
     _note(sheet, names)
 
@@ -138,7 +139,7 @@ def draw_strengths(sheet: Sheet, panel: Panel) -> None:
         curves = {}
         for share in _SHARES:
             strength, inside = strength_by(data, name, sheet.options.magnitude, share)
-            for dim in (one for one in strength.dims if one != panel.x):
+            for dim in (other for other in strength.dims if other != panel.x):
                 raise InputError(
                     f"--equations: {name} varies along {dim}: choose a value with --at"
                 )
@@ -151,7 +152,7 @@ def draw_strengths(sheet: Sheet, panel: Panel) -> None:
 
 
 def _names(sheet: Sheet) -> tuple[str, ...]:
-    """The equations that a chart was asked for (InputError: more than can be told apart)."""
+    """Return the equations of a chart (InputError: more than can be told apart)."""
     names = tuple(sheet.options.equations)
     if len(names) > _MOST:
         raise InputError(f"--equations: {len(names)}: a chart shows {_MOST} at most")
@@ -159,13 +160,13 @@ def _names(sheet: Sheet) -> tuple[str, ...]:
 
 
 def _along(estimate: Estimate, places: xr.DataArray) -> Estimate:
-    """The same as arrays along a dimension, on which it may not depend."""
+    """Return an estimate as arrays along a dimension, repeated if it does not depend on it."""
     bare = places.drop_vars([*places.coords])
     return Estimate(*(part.broadcast_like(bare).values for part in estimate))
 
 
 def _draw_each(
-    sheet: Sheet, panel: Panel, xs: Floats, each: dict[str, Estimate], factor: float = 1000.0
+    sheet: Sheet, panel: Panel, xs: Floats, each: dict[str, Estimate], factor: float = in_mm(1.0)
 ) -> None:
     """Draw estimates along `xs`, their displacements times `factor`."""
     for number, (name, estimate) in enumerate(each.items()):
@@ -231,7 +232,7 @@ def _draw_line(
 
 
 def _widen(panel: Panel, values: Floats) -> None:
-    """Extend a logarithmic ordinate upwards to show `values`, within the decades that it may have."""
+    """Extend a logarithmic ordinate upwards to show `values`, up to `_DECADES`."""
     low, high = panel.axes.get_ylim()
     if np.isfinite(values).any():
         top = min(1.5 * float(np.nanmax(values)), low * 10.0**_DECADES)
@@ -239,9 +240,9 @@ def _widen(panel: Panel, values: Floats) -> None:
 
 
 def _note(sheet: Sheet, names: tuple[str, ...]) -> None:
-    """Say, once, what the equations are for."""
+    """Add to the caption, once, the conditions that the equations are for."""
     magnitude = sheet.options.magnitude
-    given = "" if magnitude is None else f" M = {magnitude:g}."
-    text = f"{' '.join(conditions_texts(names))}{given}"
+    magnitude_text = "" if magnitude is None else f" M = {magnitude:g}."
+    text = f"{' '.join(conditions_texts(names))}{magnitude_text}"
     if text not in sheet.notes:
         sheet.notes.append(text)

@@ -1,4 +1,4 @@
-"""Figures over time: the history of a block, measured friction, measured against computed motion."""
+"""Figures over time: the history of a block, measured friction, a calibration."""
 
 import itertools
 from collections.abc import Sequence
@@ -13,11 +13,13 @@ from matplotlib.patches import Patch
 from slipsweep.charts import style
 from slipsweep.charts.sheet import Drawing
 from slipsweep.charts.slices import Result
-from slipsweep.charts.solved import slides_back_text, thresholds
 from slipsweep.charts.style import BLUE, VERMILION, Look, Options
+from slipsweep.model.units import in_mm
 from slipsweep.model.variables import SlidingMode
+from slipsweep.studies.boundaries import thresholds
+from slipsweep.studies.cautions import slides_back_text
 
-#: How the half waves of a record are drawn: told apart in grey, too.
+#: Looks of the half waves of a record: told apart in grey, too.
 _MODES: dict[SlidingMode, Look] = {
     SlidingMode.STUCK: {"facecolor": "white", "edgecolor": "0.6", "linewidth": 0.5},
     SlidingMode.STICK_SLIP: {"facecolor": "#BBD7EA", "edgecolor": BLUE, "linewidth": 0.5},
@@ -29,19 +31,19 @@ _MODES: dict[SlidingMode, Look] = {
     },
 }
 
-#: What legends above a panel have in common.
+#: Place and form of legends above a panel.
 _ABOVE: Look = {"loc": "lower right", "bbox_to_anchor": (1, 1), "frameon": False, "ncols": 4}
 
 _GREY = "0.45"
 
-#: What is on the ordinates of accelerations and, below them, of friction.
+#: Labels of the ordinates of accelerations and of friction.
 _LABELS = ("acceleration\n(m/s²)", "friction\ncoefficient")
 
 #: Of each channel of the block: label, factor to the unit drawn, and this unit.
 _CHANNELS = {
     "block_acceleration": ("acceleration of\nthe block (m/s²)", 1.0, "m/s²"),
     "relative_velocity": ("relative\nvelocity (m/s)", 1.0, "m/s"),
-    "relative_displacement": ("relative\ndisplacement (mm)", 1000.0, "mm"),
+    "relative_displacement": ("relative\ndisplacement (mm)", in_mm(1.0), "mm"),
 }
 
 
@@ -50,7 +52,7 @@ def _plot(panel: Axes, table: xr.Dataset, name: str, factor: float = 1.0, **look
 
 
 def _finish(drawing: Drawing, labels: Sequence[str], texts: list[str]) -> Figure:
-    """Labels of the last rows of panels, a line at zero and a grid in them, the time below, and a caption."""
+    """Finish a figure: the last rows of panels have `labels`, a line at zero and a grid."""
     for panels, label in zip(drawing.grid[-len(labels) :], labels, strict=True):
         panels[0].set_ylabel(label)
         for panel in panels:
@@ -64,7 +66,10 @@ def _finish(drawing: Drawing, labels: Sequence[str], texts: list[str]) -> Figure
 
 
 def history(result: Result, options: Options) -> Figure:
-    """A time history in the manner of the paper's Figs. 5, 8 and 9; of a record with the modes of its half waves."""
+    """Draw a time history like the paper's Figs. 5, 8 and 9.
+
+    A record has the sliding modes of its half waves above.
+    """
     data = result.data
     modes = "half_wave_mode" in data
     friction = "friction_coefficient" in data
@@ -83,7 +88,7 @@ def history(result: Result, options: Options) -> Figure:
         _plot(panel, data, "friction_coefficient")
     _plot(velocity, data, "relative_velocity")
     factor, unit = (
-        (1.0, "m") if (np.abs(data["relative_displacement"]) >= 1.0).any() else (1000.0, "mm")
+        (1.0, "m") if (np.abs(data["relative_displacement"]) >= 1.0).any() else (in_mm(1.0), "mm")
     )
     _plot(displacement, data, "relative_displacement", factor)
     labels = [
@@ -97,9 +102,9 @@ def history(result: Result, options: Options) -> Figure:
 
 
 def _draw_thresholds(panel: Axes, data: xr.Dataset) -> None:
-    """Lines at the accelerations of yield and of the mode limit, if the base comes near them."""
+    """Draw lines at the accelerations of yield and of the mode limit, if the base comes near."""
     lines = thresholds(data)
-    if "upslope_line" in lines:  # a line either way, not that of the first of them
+    if "upslope_line" in lines:  # lines downslope and upslope, not the smaller of the two
         lines = lines.drop_vars("yield_line")
     highest = data["half_wave_peak"].values.max(initial=0.0)
     lowest = data["ground_acceleration"].values.min(initial=0.0)
@@ -107,20 +112,21 @@ def _draw_thresholds(panel: Axes, data: xr.Dataset) -> None:
         if np.isfinite(value) and 1.5 * lowest <= value <= 1.5 * highest:
             text, look = style.LINES.get(str(name), style.LINES["yield_line"])
             label = None if name == "upslope_line" else text
-            own = {**look, "linewidth": 0.9, "zorder": 1.5}
-            panel.axhline(value.item(), label=label, gid=name, **own)
+            thin = {**look, "linewidth": 0.9, "zorder": 1.5}
+            panel.axhline(value.item(), label=label, gid=name, **thin)
 
 
 def _draw_modes(panel: Axes, data: xr.Dataset) -> None:
-    """A box for each positive half wave of the record, by the sliding mode that its peak decides."""
+    """Draw a box for each positive half wave of a record, by the sliding mode of its peak."""
     start, end, mode = (data[f"half_wave_{name}"].values for name in ("start", "end", "mode"))
     entries = []
-    for one, look in _MODES.items():
-        which = mode == one
+    for sliding_mode, look in _MODES.items():
+        which = mode == sliding_mode
         if which.any():
             spans = list(zip(start[which], (end - start)[which], strict=True))
-            panel.broken_barh(spans, (0.0, 1.0), gid=one.name.lower(), **look)
-        entries.append(Patch(label=f"{style.MODE_TEXT[one]} ({np.count_nonzero(which)})", **look))
+            panel.broken_barh(spans, (0.0, 1.0), gid=sliding_mode.name.lower(), **look)
+        text = f"{style.MODE_TEXT[sliding_mode]} ({np.count_nonzero(which)})"
+        entries.append(Patch(label=text, **look))
     panel.set(ylim=(0.0, 1.0), yticks=[])
     panel.tick_params(axis="x", bottom=False)
     panel.set_ylabel("half\nwaves", rotation=0, ha="right", va="center", fontsize="small")
@@ -129,7 +135,10 @@ def _draw_modes(panel: Axes, data: xr.Dataset) -> None:
 
 
 def friction(result: Result, options: Options) -> Figure:
-    """Measured friction in the manner of the paper's Fig. 7, with the friction by statics; slides are shaded."""
+    """Draw measured friction like the paper's Fig. 7, by Eq. 1 and by statics.
+
+    Slides are shaded.
+    """
     table = result.data
     drawing = Drawing(options, 2, 1, (7.0, 4.8), sharey=False)
     accelerations, coefficient = drawing.grid.ravel()
@@ -148,12 +157,12 @@ def friction(result: Result, options: Options) -> Figure:
         panel.axvspan(*span, color="0.92", zorder=0)
     shaded = f"shaded: slides, relative acceleration beyond {table.attrs['threshold']:.3g} m/s²"
     return _finish(
-        drawing, _LABELS, [table.attrs["constant_friction"], f"{_given(table)}; {shaded}"]
+        drawing, _LABELS, [table.attrs["constant_friction"], f"{_interface_text(table)}; {shaded}"]
     )
 
 
 def calibration(result: Result, options: Options) -> Figure:
-    """Measured against computed motion in the manner of the paper's Figs. 8 and 9, a column for each test."""
+    """Draw measured and computed motion like the paper's Figs. 8 and 9, a column for each test."""
     table = result.data
     tests = (
         [table.isel(test=i) for i in range(table.sizes["test"])]
@@ -209,25 +218,27 @@ def _draw_test(table: xr.Dataset, panels: Sequence[Axes]) -> None:
 
 
 def _friction_lines(table: xr.Dataset, panel: Axes) -> None:
-    """Friction by Eq. 1 and by statics; told apart in grey by their widths and dashes."""
+    """Draw friction by Eq. 1 and by statics, told apart in grey by widths and dashes."""
     dashed: Look = {"linewidth": 1.0, "linestyle": (0, (4, 1.5))}
     _plot(panel, table, "free_body_friction", color=BLUE, linewidth=1.6, label="by statics")
     _plot(panel, table, "friction_coefficient", label="μ(t) by Eq. 1", **dashed)
 
 
-def _given(table: xr.Dataset) -> str:
+def _interface_text(table: xr.Dataset) -> str:
+    """Return θ and μs of a test."""
     return f"θ = {table['theta'].item():.4g}°, μs = {table['mu_s'].item():.4g}"
 
 
 def _parameters(table: xr.Dataset) -> str:
-    """The parameters with their 95 % intervals."""
+    """Return the estimated parameters with their 95 % intervals, in words."""
     parts = []
     for name, unit in (("yield_acceleration", "m/s²"), ("decay_rate", ""), ("delta_mu", "")):
         low, high = table[f"{name}_interval"].values
         ends = f"{low:.3g} to {high:.3g}" if np.isfinite(high) else f"{low:.3g} or more"
-        known = bool(table[f"{name}_error"].notnull())
+        is_determined = bool(table[f"{name}_error"].notnull())
         value = f"= {style.with_unit(f'{table[name].item():.4g}', unit)} ({ends})"
         parts.append(
-            f"{style.SYMBOLS[name]} {value if known else f'not determined ({style.with_unit(ends, unit)})'}"
+            f"{style.SYMBOLS[name]} "
+            f"{value if is_determined else f'not determined ({style.with_unit(ends, unit)})'}"
         )
-    return f"{', '.join(parts)}; 95 % intervals\n{_given(table)}"
+    return f"{', '.join(parts)}; 95 % intervals\n{_interface_text(table)}"

@@ -1,4 +1,4 @@
-"""What is drawn of which result, by command and from Python: the kinds of charts, and all of them as one PDF."""
+"""The kinds of charts: which result has which, one of them drawn, all of them as one PDF."""
 
 import io
 import textwrap
@@ -17,7 +17,6 @@ from slipsweep.charts import (
     histories,
     limits,
     maps,
-    solved,
     statistics,
     style,
     suites,
@@ -29,11 +28,13 @@ from slipsweep.files.opening import values_text
 from slipsweep.files.selection import At, own_names
 from slipsweep.model.options import MODELS, changing_strength
 from slipsweep.model.variables import PARAMETERS, Validity, has_signed_displacements
+from slipsweep.studies.cautions import LEFT_OUT, unsound_texts
+from slipsweep.studies.solved_again import DISPLACEMENT, is_newmark, is_recorded
 
 Draw = Callable[[Result, Options], Figure]
 
-#: Of each sort of result: what it is called in messages, and its charts, of the kinds that their
-#: functions' names say.
+#: The name of each sort of result in messages, and its charts.  The name of a chart's function is
+#: its kind.
 SORTS: dict[str, tuple[str, tuple[Draw, ...]]] = {
     "sweep": (
         "a sweep under harmonic motion",
@@ -68,25 +69,25 @@ SORTS: dict[str, tuple[str, tuple[Draw, ...]]] = {
 #: Flags that charts hatch and Newmark's block can raise.
 _NEWMARK_FLAGS = (Validity.STATICALLY_UNSTABLE, Validity.FLEXIBLE_BLOCK)
 
-#: Those that it raises only where its strength changes while it slides.
+#: Flags that it raises only where its strength changes while it slides.
 _STRENGTH_FLAGS = (Validity.MAY_NOT_STOP, Validity.NOT_AT_REST)
 
 
 def kinds_of(sort: str) -> dict[str, Draw]:
-    """The kinds of charts of a sort of result, in order."""
+    """Return the kinds of charts of a sort of result, in order."""
     return {function.__name__: function for function in SORTS[sort][1]}
 
 
 def check_kind(kind: str) -> str:
-    """`kind` if there is such a chart (InputError otherwise)."""
-    known = [name for sort in SORTS for name in kinds_of(sort)]
-    if kind not in known:
-        raise InputError(f"--kind {kind}: no such chart; {did_you_mean(kind, known)}")
+    """Return `kind` if there is such a chart (InputError otherwise)."""
+    kinds = [name for sort in SORTS for name in kinds_of(sort)]
+    if kind not in kinds:
+        raise InputError(f"--kind {kind}: no such chart; {did_you_mean(kind, kinds)}")
     return kind
 
 
 def fitting(result: Result, options: Options) -> list[str]:
-    """The kinds that are drawn of a result if none is named; with one axis left, its curve."""
+    """Return the kinds to draw of a result if none is named; with one axis left, its curve."""
     result.check_axes()
     kinds = kinds_of(result.sort)
     if options.equations and (drawn := [kind for kind in kinds if kind in equations.KINDS]):
@@ -95,16 +96,14 @@ def fitting(result: Result, options: Options) -> list[str]:
         return [
             kind for kind in kinds if kind != "sensitivity" or "total_index" in result.variables
         ]
-    if solved.DISPLACEMENT not in result.variables:
+    if DISPLACEMENT not in result.variables:
         return ["modes"]
     free = [dim for dim in result.groups if dim not in (*options.at, *options.panels)]
     if len(free) == 1:
         several = any(len(places) > 1 for places in result.places(options.at).values())
         return ["families"] if several or options.panels else ["curve"]
     unfit = {"curve"}
-    if solved.is_newmark(
-        result.data
-    ):  # the ratio is 1, and without θ and μs there are no other options
+    if is_newmark(result.data):  # the ratio is 1, and without θ and μs there are no other options
         unfit |= {"newmark"}
         if "yield_coefficient" in result.data.coords or has_signed_displacements(result.attrs):
             unfit |= {"spread"}
@@ -112,7 +111,10 @@ def fitting(result: Result, options: Options) -> list[str]:
 
 
 def draw(result: Result, kind: str | None, options: Options) -> Figure:
-    """Draw one chart of a result, the first of those that fit if none is named (InputError if it cannot be drawn)."""
+    """Draw one chart of a result, by default the first that fits.
+
+    InputError: the chart cannot be drawn of this result.
+    """
     kinds = kinds_of(result.sort)
     kind = fitting(result, options)[0] if kind is None else check_kind(kind)
     if kind not in kinds:
@@ -120,10 +122,8 @@ def draw(result: Result, kind: str | None, options: Options) -> Figure:
         raise InputError(
             f"{result.name}: --kind {kind}: is {SORTS[result.sort][0]}: must be {allowed}"
         )
-    if options.equations and (
-        kind not in equations.KINDS or options.variable != solved.DISPLACEMENT
-    ):
-        drawn = f"--kind {', '.join(equations.KINDS)}, of {solved.DISPLACEMENT}"
+    if options.equations and (kind not in equations.KINDS or options.variable != DISPLACEMENT):
+        drawn = f"--kind {', '.join(equations.KINDS)}, of {DISPLACEMENT}"
         raise InputError(f"{result.name}: --equations: not with --kind {kind}: only with {drawn}")
     for name in ("at", "x", "y", "panels", "levels"):
         if getattr(options, name) and not result.dims:
@@ -150,7 +150,10 @@ def figure_of(
 def draw_all(
     result: Result, kinds: Iterable[str], options: Options, *, strict: bool
 ) -> tuple[dict[str, Figure], dict[str, str]]:
-    """Several charts, and why others cannot be drawn; InputError as `draw` if `strict`, or if none can be drawn."""
+    """Draw several charts; return them, and the reasons why others cannot be drawn.
+
+    InputError: as `draw`, if `strict`; or none can be drawn.
+    """
     figures: dict[str, Figure] = {}
     left_out: dict[str, str] = {}
     for kind in kinds:
@@ -162,7 +165,8 @@ def draw_all(
             left_out[kind] = str(error).removeprefix(f"{result.name}: ")
     if not figures:
         raise InputError(
-            f"{result.name}: no chart can be drawn from it: {'; '.join(dict.fromkeys(left_out.values()))}"
+            f"{result.name}: no chart can be drawn from it: "
+            f"{'; '.join(dict.fromkeys(left_out.values()))}"
         )
     return figures, left_out
 
@@ -187,7 +191,7 @@ def write_book(path: Path, result: Result, figures: Iterable[Figure]) -> None:
 
 
 def title_page(result: Result) -> Figure:
-    """What was computed, of which inputs, by which model and estimates, and by which versions."""
+    """Draw a page with the results, the inputs, the model and its estimates, and the versions."""
     attributes = result.attrs
     coords = result.data.coords
     names = {
@@ -199,30 +203,31 @@ def title_page(result: Result) -> Figure:
         for name, text in names.items()
         if name in coords
     ]
-    is_newmark = solved.is_newmark(result.data)
+    of_newmark = is_newmark(result.data)
     flags = [flag for flag in maps.HATCHES if flag not in _STRENGTH_FLAGS]
-    if is_newmark:
+    if of_newmark:
         changes = changing_strength(MODELS.from_attributes(attributes)) is not None
         flags = [*_NEWMARK_FLAGS, *(_STRENGTH_FLAGS if changes else ())]
     compared = [
-        "one interface (μs 0.38), two shaking-table tests: θ 5 and 6°, 0.36 and 0.52 g, 1.8 and 3.5 Hz"
+        "one interface (μs 0.38), two shaking-table tests: θ 5 and 6°, 0.36 and 0.52 g, 1.8 and "
+        "3.5 Hz"
     ]
-    if solved.is_recorded(result.data):
+    if is_recorded(result.data):
         compared.append("none under recorded motions: the rules for them extend the paper")
     sections = {
         "Results": [f"{name}: {style.SHOWN[name]['long_name']}" for name in result.variables],
         "Inputs": [*inputs, *filter(None, [style.drawn_text(attributes)])],
         "Model and estimates": style.model_text(attributes).splitlines(),
     }
-    if not is_newmark:
+    if not of_newmark:
         sections["Range in which the model was compared with measurements"] = compared
-    if unsound := solved.unsound_texts(result.data):
+    if unsound := unsound_texts(result.data):
         sections["Unsound"] = unsound
-    if not solved.is_recorded(result.data):
+    if not is_recorded(result.data):
         left_out = "; left out of contours and curves unless their caption says that it is drawn"
         sections["Flags that the charts hatch"] = [
             f"{style.FLAG_TEXT[flag]}: {style.flag_name(flag)} ({flag.kind}): {flag.text}"
-            f"{left_out if flag in solved.LEFT_OUT else ''}"
+            f"{left_out if flag in LEFT_OUT else ''}"
             for flag in maps.HATCHES
             if flag in flags
         ]

@@ -1,12 +1,15 @@
-"""Charts of what a displacement allows: limit amplitudes, required strengths, annual rates."""
+"""Charts of limit amplitudes, required strengths and annual rates of a displacement."""
 
 from dataclasses import replace
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from slipsweep.charts import equations, style
+from slipsweep.charts.regions import Cells
 from slipsweep.charts.sheet import (
     Drawing,
     Panel,
@@ -21,17 +24,23 @@ from slipsweep.charts.style import Floats, Look, Options
 from slipsweep.charts.suites import draw_suite, suite_text
 from slipsweep.errors import InputError
 from slipsweep.files.selection import axis_labels
+from slipsweep.model.units import in_mm
 from slipsweep.model.variables import STRENGTHS, LimitStatus, StrengthStatus
 from slipsweep.published import EQUATIONS
 from slipsweep.studies.suite_statistics import SUITE, limit_quantiles
 
-#: Most grid points of annual rates, a curve each; most displacements that are marked.
+#: Most curves of annual rates, one for each grid point.
 _MOST_CURVES = 8
+
+#: Most displacements that are marked without being requested.
 _MOST_MARKS = 20
 
 
 def limit(result: Result, options: Options) -> Figure:
-    """Limit amplitudes, in g, over one axis: a curve for each value of another; of a suite as `draw_suite`."""
+    """Draw limit amplitudes, in g, over one axis.
+
+    There is a curve for each value of another axis, or the motions of a suite (`draw_suite`).
+    """
     suite = SUITE if "motion" in result.dims else ()
     single = suite and not {*result.wide} - {*SUITE, *options.at}  # nothing varies but the motion
     along = "motion" if single else ("frequency", "mu_s", "theta", "displacement")
@@ -47,7 +56,7 @@ def limit(result: Result, options: Options) -> Figure:
             labels = [style.plain(name) for name in axis_labels(sheet.data, sheet.x)]
             panel.axes.set_xticks(panel.xs, labels, rotation=40, ha="right")
             panel.axes.set_xlabel(sheet.x)
-    # one scale for all, from zero; only now, for it ends the autoscaling
+    # one scale for all, from zero; it is set last, because it ends the autoscaling
     sheet.panels[0].axes.set_ylim(bottom=0.0)
     if not np.isfinite(sheet.data["limit_amplitude"]).any():
         sheet.note("No limits to draw: limit_status has the reasons.")
@@ -57,7 +66,7 @@ def limit(result: Result, options: Options) -> Figure:
 
 
 def _draw_curves(sheet: Sheet, panel: Panel) -> None:
-    """The curves of a family, in circles where a discontinuity of the model sets the limit."""
+    """Draw a family of curves, with circles where a discontinuity of the model sets the limit."""
     xs = panel.xs
     limits = panel.grid("limit_amplitude") / panel.g
     states = panel.grid("limit_status")
@@ -87,7 +96,7 @@ def _draw_family(sheet: Sheet, panel: Panel, values: Floats) -> None:
 
 
 def _draw_motions(sheet: Sheet, panel: Panel) -> None:
-    """The limits of the motions of a suite, with their median and band."""
+    """Draw the limits of the motions of a suite, with their median and band."""
     xs = panel.xs
     limits = panel.data["limit_amplitude"]
     quantiles = (
@@ -112,14 +121,14 @@ def _draw_points(
     panel.axes.set_xlim(*ends)
     points = values.transpose("motion", ...).values.reshape(xs.size, -1)
     polarities = panel.data["polarity"].values if "polarity" in values.dims else ()
-    names = [f"polarity {one:g}" for one in polarities] or ["a motion"]
+    names = [f"polarity {polarity:g}" for polarity in polarities] or ["a motion"]
     look: Look = {"linestyle": "", "markerfacecolor": "white", "color": "0.2"}
     for name, row, marker in zip(names, points.T, "os", strict=False):
         (sheet.legend[name],) = panel.axes.plot(xs, row, marker=marker, **look)
 
 
 def strength(result: Result, options: Options) -> Figure:
-    """Required strengths over one axis: of a suite or of samples with median and band."""
+    """Draw required strengths over one axis, of a suite or of samples with median and band."""
     of = str(result.attrs["required"])
     name = f"required_{of}"
     has_band = f"{name}_quantile" in result.variables
@@ -173,7 +182,7 @@ def _draw_required(sheet: Sheet, panel: Panel, name: str) -> None:
 
 
 def _required_text(data: xr.Dataset, has_band: bool) -> str:
-    """Return what the band is of, and how many no strength holds, or every one."""
+    """Return the caption: runs of the band, and how many stay within at any or no strength."""
     texts = []
     if has_band:
         runs = str(data.attrs.get("pooled", ""))
@@ -196,17 +205,18 @@ def _required_text(data: xr.Dataset, has_band: bool) -> str:
 
 
 def _suite_text(data: xr.Dataset) -> str:
-    """What the median is of, and the motions that have no limit."""
+    """Return the caption: motions of the median, and those that have no limit."""
     status = data["limit_status"].values
     beyond, invalid = (
-        int(np.count_nonzero(status == one))
-        for one in (LimitStatus.NOT_REACHED, LimitStatus.INVALID)
+        int(np.count_nonzero(status == code))
+        for code in (LimitStatus.NOT_REACHED, LimitStatus.INVALID)
     )
     texts = [f"Median and band are of {suite_text(data['limit_amplitude'].sizes)}."]
     if beyond:
         highest = f"{float(data.attrs['maximum_amplitude']) / float(data.attrs['g']):.4g} g"
         texts.append(
-            f"{beyond} of {status.size} limits are above {highest}; they count as larger than all others."
+            f"{beyond} of {status.size} limits are above {highest}; they count as larger than all "
+            "others."
         )
     if invalid:
         texts.append(f"{invalid} of {status.size} have no value and are left out.")
@@ -214,38 +224,29 @@ def _suite_text(data: xr.Dataset) -> str:
 
 
 def drawn_thresholds(data: xr.Dataset, requested: Floats) -> Floats:
-    """Displacements, m, that a curve of rates is drawn through: those requested, and as many as a smooth one needs."""
+    """Return displacements, m, of a smooth curve of rates, among them those requested."""
     most = max(np.nanmax(data["permanent_displacement"].values), requested[-1])
-    least = min([one for one in requested if one > 0.0] + [most]) / 10.0
+    least = min([displacement for displacement in requested if displacement > 0.0] + [most]) / 10.0
     return np.union1d(np.geomspace(least, most, 121) if most > 0.0 else [], requested)
 
 
 def hazard(result: Result, options: Options) -> Figure:
-    """The mean annual rate of exceedance over the displacement, a curve for each grid point.
+    """Draw the mean annual rate of exceedance over the displacement, a curve for each grid point.
 
-    The displacements that the attribute ``marked`` has, or all if they are few, have a marker.
+    The displacements of the attribute ``marked``, or all if they are few, have a marker.
     Curves are dotted where more than half of the rate is held above the largest amplitude.
     """
     rates = result.data
-    grid = {
-        str(dim): size for dim, size in rates["annual_rate"].sizes.items() if dim != "threshold"
-    }
-    points = [zip(grid, at, strict=True) for at in np.ndindex(*grid.values())]
     if "equation" in rates.dims:
         labels = [EQUATIONS[str(name)].label for name in rates["equation"].values]
         rates = rates.assign_coords(equation=labels)
-    names = [
-        ", ".join(member_text(rates, dim, at, options) for dim, at in point) for point in points
-    ]
-    if len(names) > _MOST_CURVES:
-        most = f"a chart shows {_MOST_CURVES} at most; cut axes with --at NAME=VALUE"
-        raise InputError(f"{len(names)} grid points: {most}")
-    wanted = rates["threshold"].values
-    few = wanted.size <= _MOST_MARKS
-    marks = np.isin(wanted, wanted if few else rates.attrs.get("marked", []))
-    lines, held = (
-        rates[name].values.reshape(-1, wanted.size) for name in ("annual_rate", "held_rate")
-    )
+    names = _names_of_curves(rates, options)
+    thresholds = rates["threshold"].values
+    few = thresholds.size <= _MOST_MARKS
+    marks = np.isin(thresholds, thresholds if few else rates.attrs.get("marked", []))
+    lines = rates["annual_rate"].values.reshape(-1, thresholds.size)
+    held = rates["held_rate"].values.reshape(-1, thresholds.size)
+    is_held = held > 0.5 * lines
     if not (lines[:, marks if marks.any() else slice(None)] > 0.0).any():
         raise InputError(
             "no motion exceeds any of the given displacements: there is nothing to draw"
@@ -259,22 +260,13 @@ def hazard(result: Result, options: Options) -> Figure:
         ylabel=f"mean annual rate of {style.displacement_symbol(rates.attrs)} > d (1/year)",
     )
     panel.grid(color="0.9", which="both")
-    for look, name, line, part in zip(curve_looks(len(names)), names, lines, held, strict=True):
-        shown = np.where((line > 0.0) & (wanted > 0.0), line, np.nan)
-        above = part > 0.5 * line
-        joined = (
-            above | np.append(False, above[:-1]) | np.append(above[1:], False)
-        )  # no gaps between the two
-        dashed = {"color": look["color"], "linestyle": look["linestyle"]}
-        panel.plot(wanted * 1000.0, np.where(above, np.nan, shown), **dashed)
-        panel.plot(
-            wanted * 1000.0, np.where(joined, shown, np.nan), color=look["color"], linestyle=":"
-        )
-        handle = {**look, "linestyle": "none"} if marks.any() else dashed
-        (drawing.legend[name],) = panel.plot(wanted[marks] * 1000.0, shown[marks], **handle)
+    xs = in_mm(thresholds)
+    for look, name, line, above in zip(curve_looks(len(names)), names, lines, is_held, strict=True):
+        rate = np.where((line > 0.0) & (thresholds > 0.0), line, np.nan)
+        drawing.legend[name] = _draw_rate(panel, xs, rate, above, marks, look)
     for axis, (low, high) in ((panel.xaxis, panel.get_xlim()), (panel.yaxis, panel.get_ylim())):
         log_ticks(axis, high / low)
-    if len(names) == 1:  # the caption has what the curve is of
+    if len(names) == 1:  # the caption has the grid point
         drawing.legend.clear()
     texts = [
         style.caption(rates, options),
@@ -285,14 +277,45 @@ def hazard(result: Result, options: Options) -> Figure:
         texts.append(" ".join(str(rates.attrs["conditions"]).splitlines()))
     if few:
         texts.append("Rates are computed at the markers; between them the lines are straight.")
-    if (held > 0.5 * lines).any():
-        ends = [float(rates.attrs[f"{name}_range"][-1]) for name in ("amplitude", "hazard_curve")]
-        what = (
-            "the largest amplitude of the sweep"
-            if ends[0] < ends[1]
-            else "the end of the hazard curve"
-        )
-        texts.append(
-            f"Dotted: more than half of the rate comes from above {what}, where P is held constant."
-        )
+    if is_held.any():
+        texts.append(_held_text(rates))
     return drawing.finish(texts)
+
+
+def _names_of_curves(rates: xr.Dataset, options: Options) -> list[str]:
+    """Return the names of the grid points of annual rates (InputError: they are too many)."""
+    sizes = rates["annual_rate"].sizes
+    grid = {str(dim): size for dim, size in sizes.items() if dim != "threshold"}
+    names = []
+    for indices in np.ndindex(*grid.values()):
+        point = zip(grid, indices, strict=True)
+        names.append(", ".join(member_text(rates, dim, index, options) for dim, index in point))
+    if len(names) > _MOST_CURVES:
+        raise InputError(
+            f"{len(names)} grid points: a chart shows {_MOST_CURVES} at most; cut axes with --at "
+            "NAME=VALUE"
+        )
+    return names
+
+
+def _draw_rate(
+    panel: Axes, xs: Floats, rate: Floats, is_held: Cells, marks: Cells, look: Look
+) -> Line2D:
+    """Draw a curve of annual rates, dotted where they are held; return its sign in the legend."""
+    # the dotted line begins where the other one ends
+    joined = is_held | np.append(False, is_held[:-1]) | np.append(is_held[1:], False)
+    dashed = {"color": look["color"], "linestyle": look["linestyle"]}
+    panel.plot(xs, np.where(is_held, np.nan, rate), **dashed)
+    panel.plot(xs, np.where(joined, rate, np.nan), color=look["color"], linestyle=":")
+    marked = {**look, "linestyle": "none"} if marks.any() else dashed
+    (line,) = panel.plot(xs[marks], rate[marks], **marked)
+    return line
+
+
+def _held_text(rates: xr.Dataset) -> str:
+    """Return the caption's sentence on rates that come from above the largest amplitude."""
+    ends = [float(rates.attrs[f"{name}_range"][-1]) for name in ("amplitude", "hazard_curve")]
+    end = "the end of the hazard curve"
+    if ends[0] < ends[1]:
+        end = "the largest amplitude of the sweep"
+    return f"Dotted: more than half of the rate comes from above {end}, where P is held constant."

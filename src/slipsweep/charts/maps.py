@@ -3,9 +3,9 @@
 Values are drawn as they are; contours are those of their logarithm, in which u = W/ω² is a straight
 line over a logarithmic frequency axis.
 
-Regions end where the equations have their limits: at the yield acceleration, at the mode limit and
-at θ = φ, where the block begins to slide under its own weight.  Up to there the cells next to a
-limit go on.  What flags mark has no equation: it consists of cells, half way to their neighbours.
+Regions end at the limits of the equations: at the yield acceleration, at the mode limit, and where
+the block begins to slide under its own weight (θ = φ).  Up to there the values of the nearest
+cells are continued.  Regions of flags have no equation: they end half way between cells.
 """
 
 import itertools
@@ -24,14 +24,15 @@ from matplotlib.ticker import FixedFormatter
 from scipy import ndimage
 from scipy.spatial import KDTree
 
-from slipsweep.charts import regions, solved, style
+from slipsweep.charts import regions, style
 from slipsweep.charts.regions import Cells
 from slipsweep.charts.sheet import Panel, Sheet
 from slipsweep.charts.slices import Result
-from slipsweep.charts.solved import DISPLACEMENT, DRIVES, has_flags, is_newmark
 from slipsweep.charts.style import Floats, Look, Options
 from slipsweep.errors import InputError
 from slipsweep.model.variables import RESULTS, VALUELESS, SlidingMode, Validity
+from slipsweep.studies.boundaries import boundaries, has_flags
+from slipsweep.studies.solved_again import DISPLACEMENT, DRIVES, is_newmark
 
 #: Colour and hatch of each mode: from light to dark.
 MODES = {
@@ -40,8 +41,8 @@ MODES = {
     SlidingMode.CONTINUOUS: ("#B07AA8", "--"),
 }
 
-#: What is drawn over what: values, no sliding, what has no value, hatches; then, over the lines,
-#: what slides under its own weight.
+#: Order of drawing (matplotlib's zorder): values, no sliding, cells without a value, hatches; then,
+#: over the lines, blocks that slide under their own weight.
 _VALUES = 0.5
 _STUCK = 1.05
 _MISSING = 1.07
@@ -76,7 +77,7 @@ _COARSE = 0.1
 
 
 def contours(result: Result, options: Options) -> Figure:
-    """Contours of a result, with the lines of yield and of the mode limit."""
+    """Draw contours of a result, with the lines of yield and of the mode limit."""
     names = result.compared(options.variable)
     levels = options.heights
     if len(levels) == 1:
@@ -91,18 +92,19 @@ def contours(result: Result, options: Options) -> Figure:
         return _finish(sheet, name)
     logs = xr.apply_ufunc(np.log10, drawn.clip(min=levels[0]))
     growth = [logs.diff(dim) for dim in (sheet.x, str(sheet.y))]
-    if any((abs(one) > 1.0).sum() > _COARSE * (one != 0.0).sum() for one in growth):
+    if any((abs(steps) > 1.0).sum() > _COARSE * (steps != 0.0).sum() for steps in growth):
         sheet.note(
-            "Coarse grid: values grow more than tenfold from cell to cell; read none between cells.",
+            "Coarse grid: values grow more than tenfold from cell to cell; read none between "
+            "cells.",
             "Coarse grid: read no values between cells.",
         )
     of_length = RESULTS[name].get("units") == "m"
     texts = [
-        style.length_text(one) if of_length else style.with_unit(f"{one:.3g}", style.unit(name))
-        for one in levels
+        style.length_text(level) if of_length else style.with_unit(f"{level:.3g}", style.unit(name))
+        for level in levels
     ]
-    # what is below the lowest level, or nothing, is a hundredth of it; what does not slide is
-    # covered later
+    # values below the lowest level, zeros too, are drawn as a hundredth of it; the area of no
+    # sliding is covered later
     sheet.data["drawn"] = drawn.clip(min=levels[0] / 100)
     colours = style.COLOURS.resampled(len(levels) + 1)
     end = "min" if drawn.max() < levels[-1] else "both"
@@ -111,7 +113,7 @@ def contours(result: Result, options: Options) -> Figure:
 
 
 def newmark(result: Result, options: Options) -> Figure:
-    """The ratio of the permanent displacement to that of Newmark's block."""
+    """Draw the ratio of the permanent displacement to that of Newmark's block."""
     if is_newmark(result.data):
         raise InputError(
             f"{result.name}: the result is of Newmark's block itself: the ratio is 1 everywhere"
@@ -125,7 +127,7 @@ def newmark(result: Result, options: Options) -> Figure:
         sheet.note("No ratio: no displacement above zero.")
         return _finish(sheet, DISPLACEMENT)
     farthest = np.abs(np.log10(there)).max()
-    # the colour changes at these and at their inverses; the first is as good as one
+    # the colour changes at these ratios and at their inverses; 1.1 counts as no difference
     above = [
         1.1,
         *(level for level in (1.5, 2.0, 3.0, 5.0, 10.0, 30.0, 100.0) if np.log10(level) < farthest),
@@ -138,7 +140,7 @@ def newmark(result: Result, options: Options) -> Figure:
 
 
 def modes(result: Result, options: Options) -> Figure:
-    """The sliding mode of every cell, by colour and hatch."""
+    """Draw the sliding mode of every cell, by colour and hatch."""
     sheet = _sheet(
         result,
         options,
@@ -146,15 +148,15 @@ def modes(result: Result, options: Options) -> Figure:
         ("theta", "yield_coefficient", "mu_s", "frequency"),
     )
     for panel in sheet.panels:
-        found = panel.grid("sliding_mode")
-        # continuous sliding and no sliding cover what they take of the rest
+        codes = panel.grid("sliding_mode")
+        # the areas of continuous sliding and of no sliding are drawn over that of stick-slip
         margins = {
             SlidingMode.STUCK: (-regions.excess_over(panel, "yield_line"), _STUCK),
-            SlidingMode.STICK_SLIP: (np.ma.ones(found.shape), _VALUES),
+            SlidingMode.STICK_SLIP: (np.ma.ones(codes.shape), _VALUES),
             SlidingMode.CONTINUOUS: (regions.excess_over(panel, "limit_line"), _VALUES + 0.1),
         }
         for mode, (colour, hatch) in MODES.items():
-            if not (found == mode).any():
+            if not (codes == mode).any():
                 continue
             look = {"facecolor": colour, "edgecolor": "white" if hatch else "0.6", "hatch": hatch}
             _fill(sheet, panel, *margins[mode], style.MODE_TEXT[mode], look)
@@ -162,13 +164,16 @@ def modes(result: Result, options: Options) -> Figure:
 
 
 def _sheet(result: Result, options: Options, names: list[str], across: Sequence[str]) -> Sheet:
-    """The slice of a map of the first of some results, with its axes and the lines of yield and of the mode limit."""
+    """Return the sheet of a map of the first of some results.
+
+    It has axes, and the lines of yield and of the mode limit.
+    """
     # with the amplitude given, modes and ratios of displacements do not depend on the frequency
     varies = across[0] == "frequency" or "displacement_amplitude" in result.data.coords
     sheet = result.sheet(options, names, across, y=DRIVES, same=[] if varies else ["frequency"])
     sheet.show(names[0], f"Hatched {UNSOUND_HATCH}")
     # the lines go on to where the block slides under its own weight, which is drawn over them
-    sheet.data = sheet.data.assign(solved.boundaries(sheet.data))
+    sheet.data = sheet.data.assign(boundaries(sheet.data))
     for panel in sheet.panels:
         panel.axes.set_facecolor(NO_VALUE)
     for panel, (name, (text, look)) in itertools.product(sheet.panels, style.LINES.items()):
@@ -206,7 +211,7 @@ def _fill_panels(
             if not shown.count():
                 continue
             filled = np.ma.masked_invalid(regions.continued(logs, inside))
-            # what contours leave open along cells without a value has the colours of the cells
+            # contours leave gaps along cells without a value; there the cells are drawn
             cells = panel.axes.pcolormesh(*edges, filled, zorder=0.4, rasterized=True, **look)
             areas = panel.axes.contourf(xs, ys, filled, places, zorder=_VALUES, extend=end, **look)
             for artist in (cells, areas):
@@ -225,14 +230,19 @@ def _fill_panels(
 
 
 def _label_contours(panel: Panel, drawn: Any, texts: dict[float, str]) -> None:
-    """Label each contour where it is farthest from the frame and from all other lines, if there is space."""
-    # inches, that a label takes to each side, and that it needs to the next line
+    """Label each contour at its point farthest from frame and other lines, if there is space."""
+    # space of a label to each side, and to the next line, inches
     label_space = 0.28
     line_space = 0.11
     inches = panel.axes.transData + panel.axes.figure.dpi_scale_trans.inverted()
     corners = panel.axes.bbox.transformed(panel.axes.figure.dpi_scale_trans.inverted()).get_points()
-    thresholds: list[Any] = [one for one in panel.axes.collections if one.get_gid() in style.LINES]
-    segments: list[Any] = [*drawn.allsegs, *(some for one in thresholds for some in one.allsegs)]
+    thresholds: list[Any] = [
+        artist for artist in panel.axes.collections if artist.get_gid() in style.LINES
+    ]
+    segments: list[Any] = [
+        *drawn.allsegs,
+        *(some for artist in thresholds for some in artist.allsegs),
+    ]
     lines = [inches.transform(np.concatenate([*some, np.empty((0, 2))])) for some in segments]
     labels: list[Floats] = []
     for at, points in enumerate(lines[: len(drawn.levels)]):
@@ -251,7 +261,7 @@ def _label_contours(panel: Panel, drawn: Any, texts: dict[float, str]) -> None:
 
 
 def _levels(name: str, values: Floats) -> list[float]:
-    """1-3-10 levels that lie in the values; of displacements those that people design for, 1 mm to 1 m."""
+    """Return levels 1, 3, 10, … among the values; of displacements, those from 1 mm to 1 m."""
     there = values[np.isfinite(values) & (values > 0)]
     if not there.size:
         return []
@@ -274,7 +284,7 @@ def _levels(name: str, values: Floats) -> list[float]:
 
 
 def _finish(sheet: Sheet, name: str) -> Figure:
-    """Area of no sliding, hatching, legend and caption of a map."""
+    """Draw the area of no sliding, hatching, legend and caption of a map."""
     scraps: Counter[Validity | None] = Counter()
     for panel in sheet.panels:
         if name != "sliding_mode":
@@ -295,17 +305,17 @@ def _finish(sheet: Sheet, name: str) -> Figure:
 
 
 def _words(flag: Validity | None) -> str:
-    """What the legend calls a flag; None: a trend that no block has."""
+    """Return the legend's words for a flag; None stands for a trend that no block has."""
     return style.UNSOUND if flag is None else style.FLAG_TEXT[flag]
 
 
 def _name(flag: Validity | None) -> str:
-    """What full captions call a flag: as results do."""
+    """Return the name of a flag in full captions, which is that in results."""
     return " ".join(style.UNSOUND.split()) if flag is None else style.flag_name(flag)
 
 
 def _whiten(sheet: Sheet, panel: Panel) -> None:
-    """Leave white what does not slide, up to the line of yield: no colour of a displacement stands for it."""
+    """Draw the area of no sliding in white, up to the line of yield."""
     excess = regions.excess_over(panel, "yield_line")
     if (excess[regions.at_rest(panel)] < 0).any():
         look = {"facecolor": "white", "edgecolor": "0.6", "hatch": ""}
@@ -313,7 +323,7 @@ def _whiten(sheet: Sheet, panel: Panel) -> None:
 
 
 def _draw_unstable(sheet: Sheet, panel: Panel) -> None:
-    """Hatch what slides under its own weight, to where Üy is zero."""
+    """Hatch the area where the block slides under its own weight, up to Üy = 0."""
     if regions.at_rest(panel).all():
         return
     flag = Validity.STATICALLY_UNSTABLE
@@ -323,7 +333,7 @@ def _draw_unstable(sheet: Sheet, panel: Panel) -> None:
 
 
 def _hatch(sheet: Sheet, panel: Panel) -> Counter[Validity | None]:
-    """Hatch the cells of each flag but the first, and what no block does; count those not hatched."""
+    """Hatch cells by flags (but statically_unstable) and unsound cells; count those too few."""
     validity = panel.data["validity"]
     rests = regions.at_rest(panel)
     missing = panel.grid(has_flags(validity, VALUELESS)) & rests
@@ -366,7 +376,7 @@ def _draw_cells(
     zorder: float,
     look: Look,
 ) -> None:
-    """Hatch cells, within a region if one is given, and give the legend an entry."""
+    """Hatch cells, within a region if it is not None, and add a legend entry."""
     area = regions.paint(panel, *regions.steps(panel, cells), zorder, look)
     area.set_gid(style.UNSOUND if flag is None else style.flag_name(flag))
     regions.clip(panel, area, region)
@@ -374,7 +384,10 @@ def _draw_cells(
 
 
 def _fill(sheet: Sheet, panel: Panel, margin: Any, zorder: float, text: str, look: Look) -> Any:
-    """Fill the region in which a margin, known at the cells, is above zero, and give the legend an entry."""
+    """Fill the region in which a margin is above zero, and add a legend entry.
+
+    The margin has a value at each cell, or is masked.
+    """
     there = ~np.ma.getmaskarray(margin)
     margin = regions.continued(np.ma.getdata(margin), there)
     area = regions.paint(panel, panel.xs, panel.ys, margin, zorder, look)
@@ -384,11 +397,11 @@ def _fill(sheet: Sheet, panel: Panel, margin: Any, zorder: float, text: str, loo
 
 
 def _large(panel: Panel, cells: Cells) -> Cells:
-    """The cells of connected regions that 0.09 inches of hatch fit into, each way: less is a scrap of hatch."""
+    """Return the cells of regions large enough to hatch: 0.09 inches in width and height."""
     window = panel.axes.bbox.transformed(panel.axes.figure.dpi_scale_trans.inverted())
     least = np.ceil(0.09 * np.array(cells.shape) / (window.height, window.width))
     high, wide = np.maximum(1, least).astype(int)
-    # beyond the frame a region may go on
+    # a region at the frame may continue beyond it
     around = np.pad(cells, [(high, high), (wide, wide)], "edge")
     inner = ndimage.binary_opening(around, np.ones((high, wide)))[high:-high, wide:-wide]
     return np.asarray(ndimage.binary_propagation(inner, np.ones((3, 3)), mask=cells))

@@ -1,7 +1,8 @@
-"""Regions of a map: where they end, and how they are painted.
+"""Regions of a map: their boundaries and their painting.
 
 The cells of a map are points.  A threshold between them (the yield acceleration, the mode limit,
-θ = φ) lies where a margin, known at the cells, is zero; up to there the cells next to it go on.
+θ = φ) lies where a margin, which has a value at each cell, is interpolated to zero.  Up to there
+the values of the nearest cells are continued.
 """
 
 from typing import Any
@@ -20,19 +21,19 @@ Cells = NDArray[np.bool_]
 
 
 def excess_over(panel: Panel, line: str) -> Any:
-    """Amplitudes over a threshold, masked where there is none."""
+    """Return amplitude less threshold, masked where there is no threshold."""
     return np.ma.masked_invalid(
         panel.grid("amplitude") - (panel.grid(line) if line in panel.data else np.nan)
     )
 
 
 def at_rest(panel: Panel) -> Cells:
-    """True where the block does not slide under its own weight."""
+    """Return True where the block does not slide under its own weight."""
     return np.asarray(panel.grid("rest_angle") > 0)
 
 
 def sides_of(panel: Panel) -> list[tuple[Cells, Path | None]]:
-    """The cells on either side of the mode limit that do not slide under their own weight.
+    """Return the cells on either side of the mode limit that do not slide under their own weight.
 
     With each side comes its region.  There is one side, and no region, if the limit does not divide
     the panel.
@@ -46,7 +47,7 @@ def sides_of(panel: Panel) -> list[tuple[Cells, Path | None]]:
 
 
 def _region(panel: Panel, margin: Any) -> Path:
-    """The region in which a margin, known at the cells, is above zero, in data coordinates."""
+    """Return the region in which a margin is above zero, in data coordinates."""
     there = ~np.ma.getmaskarray(margin)
     margin = continued(np.ma.getdata(margin), there)
     area = panel.axes.contourf(panel.xs, panel.ys, margin, [0.0, float(margin.max()) + 1.0])
@@ -56,7 +57,10 @@ def _region(panel: Panel, margin: Any) -> Path:
 
 
 def continued(values: Any, inside: Cells) -> Any:
-    """Give cells outside of a region the value of the nearest one inside; no cell is inside: as they are."""
+    """Return values in which cells outside of a region have that of the nearest one inside.
+
+    If no cell is inside, values stay as they are.
+    """
     if not inside.any():
         return values
     nearest = ndimage.distance_transform_edt(~inside, return_distances=False, return_indices=True)
@@ -64,7 +68,7 @@ def continued(values: Any, inside: Cells) -> Any:
 
 
 def edges_of(values: Floats, scale: str) -> Floats:
-    """Edges of cells: half way to their neighbours as they are drawn, and the ends of the axis."""
+    """Return edges of cells, half way between neighbours as drawn, and the ends of the axis."""
     drawn = np.log(values) if scale == "log" else values
     between = (drawn[1:] + drawn[:-1]) / 2.0
     if scale == "log":
@@ -73,7 +77,7 @@ def edges_of(values: Floats, scale: str) -> Floats:
 
 
 def steps(panel: Panel, cells: Cells) -> tuple[Floats, Floats, Any]:
-    """Edges of cells and a margin above zero in them, for `paint`: its region ends at their edges."""
+    """Return edges of cells and a margin that is above zero in them (arguments of `paint`)."""
     xs = edges_of(panel.xs, panel.axes.get_xscale())
     ys = edges_of(panel.ys, panel.axes.get_yscale())
     margin = np.repeat(np.repeat(cells, 2, axis=0), 2, axis=1) - 0.5
@@ -100,11 +104,11 @@ def paint(panel: Panel, xs: Floats, ys: Floats, margin: Floats, zorder: float, l
 
 
 def legend_patch(panel: Panel, look: Look) -> Patch:
-    """Sign of a region in the legend."""
+    """Return the legend's patch of a region."""
     with mpl.rc_context({"hatch.linewidth": 0.6}):
         return Patch(linewidth=0.6, **{**look, "hatch": _dense(panel, look["hatch"])})
 
 
 def _dense(panel: Panel, hatch: str) -> str:
-    """A hatch that is as much closer in narrow figures as their text is smaller."""
+    """Return a hatch that is denser in narrow figures, as their text is smaller."""
     return hatch[:1] * round(len(hatch) * 10.0 / panel.options.font)

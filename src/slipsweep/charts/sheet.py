@@ -1,4 +1,7 @@
-"""The one builder of figures, without pyplot: size, panels, axes, legend outside of the data, caption, grey."""
+"""Figures without pyplot: size, panels, axes, legend beside the data, caption, grey.
+
+All charts are built with the classes of this module.
+"""
 
 import io
 import itertools
@@ -18,13 +21,24 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from slipsweep.charts import solved, style
+from slipsweep.charts import style
+from slipsweep.charts.magnitudes import UPSLOPE_SHARE
 from slipsweep.charts.style import Floats, Look, Options
 from slipsweep.errors import InputError
 from slipsweep.files.selection import axis_labels, axis_numbers
 from slipsweep.model.variables import Validity
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
+from slipsweep.studies.boundaries import has_flags, thresholds
+from slipsweep.studies.cautions import (
+    LEFT_OUT,
+    SLIDES_BACK,
+    estimated_friction_text,
+    percent,
+    reliable,
+    unsound,
+)
+from slipsweep.studies.solved_again import DISPLACEMENT, is_newmark, newmark_displacement
 from slipsweep.studies.upslope import sliding_ways
 
 #: Dashes and markers of the curves of a family, and how many markers a curve has.
@@ -39,23 +53,25 @@ _DASHES = (
 _MARKERS = ("o", "s", "^", "D", "v", "x")
 _MARKED = 7
 
-#: Width of a figure of one panel, inches; characters of a caption in an inch, and in a label's line
-#: of a small panel.
+#: Width of a figure of one panel, inches.
 _WIDTH = 7.0
+
+#: Characters of a caption in an inch.
 _CHARACTERS = 15
+
+#: Characters in a line of a label of a small panel.
 _LABEL = 26
 
-#: Height of a line of a caption or legend, inches, and lines that the usual height has a place for.
+#: Height of a line of a caption or legend, inches, and number of lines in the usual height.
 _LINE = 0.165
 _LINES = 4
-
 
 #: Name of colour maps without colour.
 _GREY = "grey of slipsweep"
 
 
 class Chart(Figure):
-    """A figure that a notebook shows as a picture, also if neither pyplot nor a backend is loaded."""
+    """A figure that a notebook shows as a picture without pyplot and without a backend."""
 
     def _repr_png_(self) -> bytes:
         content = io.BytesIO()
@@ -64,11 +80,11 @@ class Chart(Figure):
 
 
 class Drawing:
-    """A figure of panels with a legend, in which what several panels have is once, and a caption.
+    """A figure of panels with one legend and a caption.
 
-    `options.width` scales the size in inches, `options.ax` is drawn in instead of a new figure;
-    `shared` goes to `Figure.subplots`.  Remarks come last in the legend; notes are sentences for
-    the caption.
+    `size` is in inches, and `options.width` scales it.  With `options.ax` these axes are drawn in,
+    and there is no new figure.  `shared` goes to `Figure.subplots`.  Remarks come last in the
+    legend; notes are sentences of the caption.
     """
 
     def __init__(
@@ -104,7 +120,7 @@ class Drawing:
             self.notes.append(sentence)
 
     def finish(self, texts: Sequence[str], beside: bool = True) -> Figure:
-        """Draw the title, the legend beside or above the panels, and a caption of `texts` and notes."""
+        """Draw the title, the legend (`beside` or above the panels), and the caption."""
         entries = self.legend | self.remarks
         look = Look(fontsize="small", frameon=False)
         if any(isinstance(artist, Patch) for artist in entries.values()):
@@ -118,7 +134,7 @@ class Drawing:
         return self.figure
 
     def _wrapped(self, texts: Sequence[str], characters: int) -> list[str]:
-        """The lines of a caption; the notes of a short one are a paragraph."""
+        """Return the lines of a caption; the notes of a short one are a paragraph."""
         notes = [" ".join(self.notes)] if self.options.is_brief else self.notes
         every = [line for text in (*texts, *notes) for line in text.splitlines()]
         return [line for text in every for line in textwrap.wrap(text, characters)]
@@ -126,7 +142,7 @@ class Drawing:
     def _add_to(
         self, axes: Axes, texts: Sequence[str], entries: dict[str, Artist], look: Look
     ) -> None:
-        """Title, legend and caption beside the axes of another figure."""
+        """Draw title, legend and caption beside the axes of another figure."""
         if self.options.title:
             axes.set_title(style.plain(self.options.title))
         right = any(other.yaxis.get_ticks_position() == "right" for other in axes.child_axes)
@@ -151,7 +167,7 @@ class Drawing:
     def _lay_out(
         self, texts: Sequence[str], entries: dict[str, Artist], beside: bool, look: Look
     ) -> None:
-        """Title, legend and caption of a figure, which grows by the lines that they need."""
+        """Draw title, legend and caption; make the figure higher by the lines that they need."""
         self._set_small()
         width, height = self.figure.get_size_inches()
         size = self.options.font / 10.0
@@ -164,7 +180,7 @@ class Drawing:
         above = 0 if beside or not entries else math.ceil(len(entries) / columns) * longest - 1
         lines: float = max(0, above + len(caption) - _LINES)
         if self.options.title:
-            # the layout has no place for a legend below a title of the figure: it is the legend's
+            # the layout cannot put a legend below the title of the figure: it becomes the legend's
             is_left = bool(entries) and beside  # of the legend
             shown = textwrap.fill(self.options.title, int((0.42 if is_left else 0.66) * characters))
             lines += shown.count("\n") + 1.5
@@ -187,7 +203,7 @@ class Drawing:
         self.figure.supxlabel("\n".join(caption), fontsize="small")
 
     def _set_small(self) -> None:
-        """Sizes of text, in points: ticks are made only when the figure is drawn."""
+        """Set sizes of text, in points (ticks are made only when the figure is drawn)."""
         several = self.grid.size > 1
         size = self.options.font * (0.833 if several else 1.0)
         for panel in self.grid.ravel():
@@ -200,18 +216,18 @@ class Drawing:
 
 
 def _without_colour(figure: Figure) -> None:
-    """Replace all colours by their lightness, those of maps by lighter ones, on which hatches show."""
+    """Replace all colours by their lightness, in maps by lighter greys, so that hatches show."""
     for artist in figure.findobj():
         if isinstance(artist, ScalarMappable) and artist.get_array() is not None:
-            given = artist.get_cmap()
-            if given.name == _GREY:  # of a chart that was drawn in other axes before
+            colour_map = artist.get_cmap()
+            if colour_map.name == _GREY:  # of a chart that was drawn in other axes before
                 continue
             # lines and areas of contours of one colour keep its lightness
             one_colour = getattr(artist, "colors", None) is not None
             to_grey = style.to_grey if one_colour else style.to_light_grey
-            ends = {"under": given.get_under(), "over": given.get_over()}
-            shades = ListedColormap(to_grey(given(np.arange(given.N))), _GREY)
-            extremes = {end: to_grey(one)[0] for end, one in ends.items()}
+            ends = {"under": colour_map.get_under(), "over": colour_map.get_over()}
+            shades = ListedColormap(to_grey(colour_map(np.arange(colour_map.N))), _GREY)
+            extremes = {end: to_grey(colour)[0] for end, colour in ends.items()}
             artist.set_cmap(shades.with_extremes(**extremes))
             continue
         for kind in ("color", "markerfacecolor", "markeredgecolor", "facecolor", "edgecolor"):
@@ -221,7 +237,7 @@ def _without_colour(figure: Figure) -> None:
 
 
 class Panel:
-    """A part of a sheet's slice, `at` a row and column, and the axes it is drawn in."""
+    """A part of a sheet's slice, and its axes; `at` is its row and column."""
 
     def __init__(self, sheet: "Sheet", axes: Axes, at: tuple[int, ...]) -> None:
         self._sheet = sheet
@@ -246,11 +262,14 @@ class Panel:
 
     @property
     def data(self) -> xr.Dataset:
-        """The sheet's slice at the panel's values."""
+        """The sheet's slice, cut at the panel's values."""
         return self._sheet.data.isel(self._where, missing_dims="ignore")
 
     def grid(self, values: str | xr.DataArray, *dims: str | None) -> Any:
-        """Values over (y, x) or other dimensions, in that order, repeated along those they lack; None has length 1."""
+        """Return values over (y, x) or other dimensions, in that order.
+
+        They are repeated along dimensions that they lack; None is a dimension of length 1.
+        """
         data = self.data
         dims = dims or (self.y, self.x)
         array = data[values] if isinstance(values, str) else values
@@ -260,17 +279,19 @@ class Panel:
         return full.values.reshape([full.sizes[dim] if dim else 1 for dim in dims])
 
     def member(self, index: int) -> str:
-        """Name of a curve."""
+        """Return the name of a curve."""
         return "" if self.y is None else member_text(self.data, self.y, index, self.options)
 
     def add_title(self, text: str) -> None:
-        """A line more over the panel."""
+        """Add a line of text over the panel."""
         title = self.axes.get_title()
         self.axes.set_title(f"{title}\n{text}" if title else text, fontsize="small")
 
 
 class Sheet(Drawing):
-    """A figure of panels that share their scales, of one slice, across and down along the dimensions `along`.
+    """A figure of one slice, in panels that share their scales.
+
+    Panels lie across and down along the dimensions `along`.
 
     `x` and `y` are the axes of a map; of curves `y` is the curve parameter, or None.
     """
@@ -292,7 +313,10 @@ class Sheet(Drawing):
         self.panels = [Panel(self, axes, at) for at, axes in np.ndenumerate(self.grid)]
 
     def set_axis(self, side: str) -> None:
-        """Scale, ticks and label of an axis, and the acceleration in the other unit on the opposite side."""
+        """Set scale, ticks and label of an axis.
+
+        An acceleration has its other unit on the opposite side.
+        """
         name, values = (
             (self.x, self.panels[0].xs) if side == "x" else (str(self.y), self.panels[0].ys)
         )
@@ -313,56 +337,60 @@ class Sheet(Drawing):
                 _second_scale(axes, side, panel.g, self.options.units, style.SYMBOLS[name])
 
     def note_left_out(self, name: str, *others: xr.DataArray) -> None:
-        """Say which unreliable values are left out or drawn on request; displacements upslope have no logarithm."""
+        """Add to the caption which unreliable values are left out, or drawn on request.
+
+        Displacements upslope are always left out, as they have no logarithm.
+        """
         validities = [*others, *([self.data["validity"]] if "validity" in self.data else [])]
         groups: dict[str, list[Validity]] = {}
-        for flag in solved.LEFT_OUT:
-            if any(solved.has_flags(one, flag).any() for one in validities):
+        for flag in LEFT_OUT:
+            if any(has_flags(validity, flag).any() for validity in validities):
                 drawn = self.options.show_cautions and not (
-                    name == solved.DISPLACEMENT and flag == Validity.UPSLOPE
+                    name == DISPLACEMENT and flag == Validity.UPSLOPE
                 )
                 groups.setdefault("Drawn on request" if drawn else "Left out", []).append(flag)
         for heading, flags in groups.items():
-            texts = " or ".join(solved.LEFT_OUT[flag] for flag in flags)
+            texts = " or ".join(LEFT_OUT[flag] for flag in flags)
             words = ", ".join(style.FLAG_TEXT[flag] for flag in flags)
             self.note(f"{heading}: values flagged {texts}.", f"{heading}: {words}.")
 
     def note_slides_back(self, motion: Record | Suite | None) -> None:
-        """Say of how many sliding cells the block would also slide upslope, which is left out."""
-        shown = solved.reliable(self.data, solved.DISPLACEMENT, self.options.show_cautions) > 0
+        """Add to the caption the share of sliding cells whose block would also slide upslope."""
+        shown = reliable(self.data, DISPLACEMENT, self.options.show_cautions) > 0
         ways = sliding_ways(self.data, motion)
         if ways is not None and (shown & ways[1]).any():
-            percent = solved.percent(int((shown & ways[1]).sum()) / int(shown.sum()))
+            share = percent(int((shown & ways[1]).sum()) / int(shown.sum()))
             self.note(
-                f"In {percent} of the sliding cells shown {solved.SLIDES_BACK}.",
-                f"{percent} would also slide upslope: displacement too large.",
+                f"In {share} of the sliding cells shown {SLIDES_BACK}.",
+                f"{share} would also slide upslope: displacement too large.",
             )
 
     def note_magnitude(self) -> None:
-        """Say that displacements are drawn without their signs, if they have signs."""
-        share = self.data.attrs.get(solved.UPSLOPE_SHARE)
+        """Add to the caption that displacements are drawn without signs, if they have signs."""
+        share = self.data.attrs.get(UPSLOPE_SHARE)
         if share is not None:
-            percent = solved.percent(share)
+            text = percent(share)
             self.note(
-                f"Drawn is |u|: {percent} of the sliding cells shown end upslope, u < 0.",
-                f"|u|: {percent} end upslope.",
+                f"Drawn is |u|: {text} of the sliding cells shown end upslope, u < 0.",
+                f"|u|: {text} end upslope.",
             )
 
     def show(self, name: str, marked: str, always: bool = False) -> None:
-        """Add to the slice what charts of a result draw.
+        """Add to the slice the variables that charts of a result draw.
 
-        ``drawn``, the values that may be drawn; `thresholds`; of displacements ``newmark``, that of
-        Newmark's block, and ``unsound``, where there is a trend that no block has.  Notes compare
-        the two, and say how much is `marked`.
+        They are ``drawn``, the values that may be drawn; those of `thresholds`; and for
+        displacements ``newmark``, those of Newmark's block, and ``unsound``, True where there is a
+        trend that no block has.  Notes in the caption compare the two displacements, and give the
+        share of unsound cells after the words `marked`.
         """
-        drawn = solved.reliable(self.data, name, self.options.show_cautions)
-        self.data = self.data.merge(solved.thresholds(self.data, always)).assign(drawn=drawn)
-        if name != solved.DISPLACEMENT or solved.is_newmark(self.data):
+        drawn = reliable(self.data, name, self.options.show_cautions)
+        self.data = self.data.merge(thresholds(self.data, always)).assign(drawn=drawn)
+        if name != DISPLACEMENT or is_newmark(self.data):
             return
-        theirs = solved.newmark(self.data)
-        if theirs is not None:
-            self.data["newmark"] = theirs.reset_coords(drop=True)
-            ratio = (drawn / theirs).where(lambda one: np.isfinite(one) & (one > 0))
+        of_newmark = newmark_displacement(self.data)
+        if of_newmark is not None:
+            self.data["newmark"] = of_newmark.reset_coords(drop=True)
+            ratio = (drawn / of_newmark).where(lambda values: np.isfinite(values) & (values > 0))
             if ratio.notnull().any():
                 low, middle, high = np.nanquantile(ratio, (0.05, 0.5, 0.95))
                 self.note(
@@ -371,16 +399,16 @@ class Sheet(Drawing):
                     f"90 % of the sliding cells shown lie between {low:.3g} and {high:.3g}.",
                     short="",
                 )
-        self.data["unsound"], trends = solved.unsound(self.data, drawn, theirs)
+        self.data["unsound"], trends = unsound(self.data, drawn, of_newmark)
         if trends:
-            share = solved.percent(int(self.data["unsound"].sum()) / int((drawn > 0).sum()))
+            share = percent(int(self.data["unsound"].sum()) / int((drawn > 0).sum()))
             self.note(
                 f"{marked}: {share} of the sliding cells shown. {trends[0].upper()}{trends[1:]}.",
                 f"{marked}: {share} of the sliding cells, a trend that no block has.",
             )
         if "limit_line" in self.data and "validity" in self.data:
             continuous = self.data["amplitude"] > self.data["limit_line"]
-            text = solved.estimated(self.data, drawn, continuous.reset_coords(drop=True))
+            text = estimated_friction_text(self.data, drawn, continuous.reset_coords(drop=True))
             if text:
                 self.note(f"{text}.", f"{text}.".replace(" of the sliding cells", ""))
 
@@ -397,19 +425,19 @@ class Sheet(Drawing):
         if not self.options.is_brief:
             text += f"; {self.data.attrs.get('source', 'slipsweep')}"
         cases = []
-        own = [
+        of_cases = [
             name
             for name in style.SYMBOLS
             if name in self.data.coords and self.data[name].dims == ("case",)
         ]
         for at in range(self.data.sizes.get("case", 0)):
-            values = ", ".join(member_text(self.data, name, at, self.options) for name in own)
+            values = ", ".join(member_text(self.data, name, at, self.options) for name in of_cases)
             cases.append(f"{member_text(self.data, 'case', at, self.options)}: {values}.")
         return self.finish([text, *cases], beside)
 
 
 def member_text(data: xr.Dataset, dim: str, index: int, options: Options) -> str:
-    """A value of an axis that tells curves or panels apart: ``θ = 5°``, or a case by its label."""
+    """Return the name of a curve or panel: a value (``θ = 5°``) or a label."""
     labels = axis_labels(data, dim)
     if labels:
         return style.plain(labels[index])
@@ -426,7 +454,7 @@ def is_log(values: Floats) -> bool:
 
 
 def log_ticks(axis: Any, span: float) -> None:
-    """Ticks of a logarithmic axis over some ratio of its ends, with numbers as people write them."""
+    """Set ticks of a logarithmic axis; `span` is the ratio of its ends."""
     axis.set_major_locator(LogLocator(subs=(1, 2, 5) if span < 2000 else (1,)))
     axis.set_major_formatter(
         lambda value, _: f"{value:,.0f}".replace(",", " ") if value >= 1e4 else f"{value:g}"
@@ -435,14 +463,14 @@ def log_ticks(axis: Any, span: float) -> None:
 
 
 def _second_scale(axes: Axes, side: str, g: float, units: str, symbol: str) -> None:
-    """An acceleration in the other unit, on the other side, with round values of its own."""
+    """Draw an acceleration in the other unit on the other side, with round values there."""
     factor, text = (g, f"{symbol} (m/s²)") if units == "g" else (1 / g, f"{symbol} (g)")
     add: Any = axes.secondary_yaxis if side == "y" else axes.secondary_xaxis
     other = add(
         "right" if side == "y" else "top", functions=(lambda a: a * factor, lambda a: a / factor)
     )
     low, high = getattr(axes, f"get_{side}lim")()
-    # it would take them when it is drawn, too late for the layout to leave space for its numbers
+    # set now: matplotlib would set them when it draws, after the layout has left space for numbers
     other.set(**{f"{side}lim": (low * factor, high * factor), f"{side}label": text})
     if getattr(axes, f"get_{side}scale")() == "log":
         log_ticks(getattr(other, f"{side}axis"), high / low)
@@ -451,17 +479,18 @@ def _second_scale(axes: Axes, side: str, g: float, units: str, symbol: str) -> N
 def log_axis(
     axes: Axes, values: Floats, label: str, least: float | None = 1.0, zeros: bool = False
 ) -> float:
-    """A logarithmic ordinate that shows what is above `least`, and no more than seven decades.
+    """Set a logarithmic ordinate for the values above `least`, of seven decades at most.
 
-    With `zeros` curves come from below the axis: it begins at `least`.  Returns a number below the
-    end of the axis, that may be drawn for zero.  InputError: no value is above zero.
+    With `zeros` the axis begins at `least` if a value is zero: curves come from below it.  Return a
+    number below the axis that may be drawn for zero.  InputError: no value is above zero.
     """
     finite = values[np.isfinite(values)]
     there = finite[finite > 0]
     if not there.size:
         what = "no value above zero" if finite.size else "no value"
         raise InputError(
-            f"{label}: {what} in this slice, and the axis is logarithmic; choose another slice (--at)"
+            f"{label}: {what} in this slice, and the axis is logarithmic; choose another slice "
+            "(--at)"
         )
     high = float(there.max())
     low = max(float(there.min()), high * 1e-7)
@@ -475,7 +504,7 @@ def log_axis(
 
 
 def curve_looks(number: int) -> list[Look]:
-    """Colour, dash and marker of the curves of a family: told apart without colour."""
+    """Return colour, dash and marker of the curves of a family, told apart without colour."""
     # not up to the yellow end, which is faint on white and in grey
     colours = mpl.colormaps["viridis"](np.linspace(0, 0.68, number))
     return [
@@ -493,7 +522,7 @@ def curve_looks(number: int) -> list[Look]:
 
 
 def plot_curve(axes: Axes, xs: Floats, ys: Floats, offset: float = 0.0, **look: Any) -> Any:
-    """Draw a line with a few markers, and one on each value that has no neighbour to be joined with.
+    """Draw a line with a few markers, and one on each value without a neighbour.
 
     `offset` moves the markers by that part of their distance.  Zeros leave gaps where the ordinate
     is logarithmic.

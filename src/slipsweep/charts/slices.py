@@ -1,4 +1,7 @@
-"""Slices of a result: the cells that a chart shows and no others, read, or solved where the result has none."""
+"""Slices of a result: the cells that a chart shows, and no others.
+
+They are read, or solved where the result does not have them.
+"""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -8,25 +11,26 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from slipsweep.charts.magnitudes import by_magnitude
 from slipsweep.charts.sheet import Sheet
-from slipsweep.charts.solved import (
-    DISPLACEMENT,
-    by_magnitude,
-    is_newmark,
-    is_recorded,
-    solve,
-    with_amplitude,
-)
 from slipsweep.charts.style import SHOWN, Options, check_attributes
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files.motions import read_embedded
 from slipsweep.files.selection import At, Place, axis_labels, between, find
+from slipsweep.model.parameters import friction_coefficient
 from slipsweep.model.variables import PARAMETERS, STATISTIC_COORDINATES, STATISTICS
+from slipsweep.studies.solved_again import (
+    DISPLACEMENT,
+    is_newmark,
+    is_recorded,
+    solve_again,
+    with_amplitude,
+)
 
-#: Dimensions whose places have names, and no order.
+#: Dimensions whose places have names and no order.
 NAMED = ("case", "motion")
 
-#: Variables by which results of functions other than `sweep` are known, one of which they have.
+#: Variables of results of functions other than `sweep`; a result of a sort has one of these.
 OTHER_SORTS = {
     "limit": ("limit_amplitude",),
     "strength": ("required_status", "never_within_count"),
@@ -36,7 +40,7 @@ OTHER_SORTS = {
     "history": ("relative_displacement",),
 }
 
-#: Of them, those that have axes to draw over.
+#: Sorts of them that have axes to draw over.
 _LIMITS = ("limit", "strength")
 
 #: Most curves of a family, panels across and down, and points of an axis that a figure can show.
@@ -44,20 +48,20 @@ _CURVES = 6
 _PANELS = 3
 _POINTS = 600
 
-#: What draws a cell that no axis is left for.
+#: Advice for a result without an axis to draw over.
 _OF_ONE_CELL = "slipsweep simulate draws the time history of one cell"
 
-#: What is kept of an axis: a slice of it, or places, some of which may lie between its values.
+#: The part of an axis that is kept: a slice, or places, some of them between its values.
 Kept = slice | Sequence[Place]
 
 
 class Result:
-    """A result that is drawn: a dataset, and what it is called in errors.  Only what is drawn of it is read.
+    """A result to draw: a dataset, and its name in errors.  Only the cells that are drawn are read.
 
-    `sort` says what it is a result of: "sweep", "statistics", "record", "suite", or one of
-    `OTHER_SORTS`, of which only limits and required strengths have `variables`, the names of its
-    results, and `dims`, their dimensions.  InputError: it is no result, does not say what was
-    solved, or has other units than slipsweep writes.
+    `sort` is "sweep", "statistics", "record", "suite", or one of `OTHER_SORTS`.  `variables` are
+    the names of its results and `dims` their dimensions; of `OTHER_SORTS` only limits and required
+    strengths have these.  InputError: it is no result, its attributes lack the model or the
+    shaking, or it has other units than slipsweep writes.
     """
 
     def __init__(self, data: xr.Dataset, name: str | Path) -> None:
@@ -69,22 +73,22 @@ class Result:
             self.variables = []
             self.dims = []
             return
-        self.variables = [str(one) for one in data.data_vars if one in SHOWN]
+        self.variables = [str(key) for key in data.data_vars if key in SHOWN]
         if not self.variables:
             raise InputError(f'{name}: not a result of "slipsweep run"')
         recorded = self.sort in ("record", "suite")
-        #: The recorded motion or motions, if the file has them; and the one to solve slices under.
+        #: The recorded motion or motions, if the file has them, and the record of a slice.
         self.shaking = read_embedded(data, Path(name)) if recorded else None
         self.motion = self.shaking if self.sort == "record" else None
         data = data[self.variables]
         if 0 in data.sizes.values():
             raise InputError(f"{name}: holds no cells")
         check_attributes(data.attrs, self.name)
-        for key, one in data.variables.items():
+        for key, variable in data.variables.items():
             units = (SHOWN | PARAMETERS).get(str(key), {}).get("units")
-            if units and one.attrs.get("units", units) != units:
+            if units and variable.attrs.get("units", units) != units:
                 raise InputError(
-                    f'{name}: {key}: units = "{one.attrs["units"]}"; must be "{units}"'
+                    f'{name}: {key}: units = "{variable.attrs["units"]}"; must be "{units}"'
                 )
         self.dims = [str(dim) for dim in data.sizes]
         ordered = [dim for dim in self.dims if dim in PARAMETERS and dim != "polarity"]
@@ -99,62 +103,72 @@ class Result:
 
     @property
     def wide(self) -> list[str]:
-        """Axes that a chart can be drawn over: those of a parameter that has more than one value."""
-        known = {*PARAMETERS, *STATISTIC_COORDINATES, "displacement"}
+        """Axes to draw over: those of a parameter with more than one value."""
+        numbered = {*PARAMETERS, *STATISTIC_COORDINATES, "displacement"}
         return [
             dim
             for dim in self.dims
-            if self.data.sizes[dim] > 1 and dim in known and dim in self.data.coords
+            if self.data.sizes[dim] > 1 and dim in numbered and dim in self.data.coords
         ]
 
     @property
     def groups(self) -> list[str]:
-        """Axes whose values can tell curves or panels apart: also cases and motions, which have no order."""
+        """Axes of curves or panels: `wide`, and cases and motions, which have no order."""
         return [
             *self.wide,
             *(dim for dim in NAMED if dim in self.dims and self.data.sizes[dim] > 1),
         ]
 
     def check_axes(self) -> None:
-        """Refuse the result of a sweep that has no axis to draw a chart over (InputError)."""
+        """Raise InputError for the result of a sweep that has no axis to draw over."""
         if self.sort in ("sweep", "record") and not self.wide:
             raise InputError(
                 f"{self.name}: no axis has two values or more, which charts need; {_OF_ONE_CELL}"
             )
 
     def result(self, name: str) -> str:
-        """`name` if it is a result in the file (InputError otherwise, naming those there are)."""
-        return self.known(name, self.variables, f"{name}: no such variable")
+        """Return `name` if it is a result in the file (InputError otherwise, with those in it)."""
+        return self.checked(name, self.variables, f"{name}: no such variable")
 
-    def known(self, given: str, there: Sequence[str], problem: str, more: str = "") -> str:
-        """What a user names, if it is there (InputError otherwise: the problem, and what is there)."""
-        if given not in there:
-            raise InputError(f"{self.name}: {problem}; {did_you_mean(given, there)}{more}")
-        return given
+    def checked(self, name: str, there: Sequence[str], problem: str, more: str = "") -> str:
+        """Return a name that a user gives, if it is among `there` (InputError: `problem`)."""
+        if name not in there:
+            raise InputError(f"{self.name}: {problem}; {did_you_mean(name, there)}{more}")
+        return name
 
     def compared(self, name: str) -> list[str]:
-        """A quantity with its flags, and Newmark's displacement if the file has it, or the record to solve it under."""
+        """Return the names of a quantity, its flags and, for displacements, Newmark's.
+
+        Newmark's is among them if the file has it, or the record under which it can be solved.
+        """
         if self.result(name) in ("sliding_mode", "validity"):
             raise InputError(
-                f"{self.name}: --variable {name}: is a code, not a quantity; --kind modes shows the modes"
+                f"{self.name}: --variable {name}: is a code, not a quantity; --kind modes shows "
+                "the modes"
             )
-        theirs = "newmark_displacement"
-        known = theirs in self.variables or (self.motion is not None and not is_newmark(self.data))
-        return [name, "validity", *([theirs] if name == DISPLACEMENT and known else [])]
+        names = [name, "validity"]
+        of_newmark = "newmark_displacement"
+        can_be_solved = self.motion is not None and not is_newmark(self.data)
+        if name == DISPLACEMENT and (of_newmark in self.variables or can_be_solved):
+            names.append(of_newmark)
+        return names
 
     def places(self, at: Mapping[str, At]) -> dict[str, list[Place]]:
-        """Where on the axes the requested values are; InputError as `find`, or where no cell is or can be solved."""
-        found = find(self.data, at, self.name)
-        for name, places in found.items():
+        """Return the places of requested values on their axes.
+
+        InputError: as of `find`; or there is no cell, and none can be solved.
+        """
+        requested = find(self.data, at, self.name)
+        for name, places in requested.items():
             for place in places:
                 if place.index is None and (reason := self._unsolvable(name)):
                     raise InputError(
                         f"{self.name}: {between(self.data, name, place.value)} ({reason})"
                     )
-        return found
+        return requested
 
     def _unsolvable(self, dim: str) -> str:
-        """Why no slice at another value of an axis can be solved; empty where it can."""
+        """Return why no slice can be solved at another value of an axis; empty if it can."""
         if self.sort != "sweep":
             return "nothing is computed again for a chart of statistics, limits or recorded motions"
         derived = {
@@ -171,17 +185,17 @@ class Result:
     def select(
         self, names: Iterable[str], keep: Mapping[str, Kept], at: Mapping[str, At]
     ) -> xr.Dataset:
-        """The cells of a slice, read, or solved where the result of a sweep does not have them.
+        """Return the cells of a slice, read, or solved where the result of a sweep lacks them.
 
-        `keep` has what stays of the axes that stay; the others are cut where `at` says, else in the
-        middle, `polarity` at 1.  Every parameter is a coordinate; the attribute ``picked`` names
-        the case and motion that were selected.
+        `keep` has the parts of axes that stay.  The other axes are cut at the values of `at`, else
+        in the middle, and `polarity` at 1.  Every parameter is a coordinate; the attribute
+        ``picked`` names the case and motion that were selected.
         """
         cuts = self.places(at)
         exact = {}
         picked = {}
-        index: dict[str, Any] = {dim: one for dim, one in keep.items() if isinstance(one, slice)}
-        for dim in [one for one in self.dims if one not in index]:
+        index: dict[str, Any] = {dim: part for dim, part in keep.items() if isinstance(part, slice)}
+        for dim in [other for other in self.dims if other not in index]:
             middle = 0 if dim in NAMED else (self.data.sizes[dim] - 1) // 2
             if dim == "polarity":
                 middle = int(np.argmax(self.data[dim].values))
@@ -193,7 +207,8 @@ class Result:
             dims, shape = ((dim,), [len(chosen)]) if dim in keep else ((), [])
             index[dim] = np.reshape([place.index or 0 for place in chosen], shape)
             if any(place.index is None for place in chosen):
-                exact[dim] = dims, np.reshape([one.value for one in chosen], shape), PARAMETERS[dim]
+                values = np.reshape([place.value for place in chosen], shape)
+                exact[dim] = dims, values, PARAMETERS[dim]
             elif not dims and dim in NAMED and (labels := axis_labels(self.data, dim)):
                 picked[dim] = labels[chosen[0].index]
         there = [name for name in names if name in self.variables]
@@ -201,18 +216,21 @@ class Result:
         if exact and "displacement_amplitude" in data.coords:
             data = data.drop_vars("amplitude", errors="ignore")
         if "phi" in exact:
-            tangent = np.tan(np.radians(data["phi"].values))
+            tangent = friction_coefficient(data["phi"].values)
             data = data.assign_coords(mu_s=(data["phi"].dims, tangent, PARAMETERS["mu_s"]))
         data = with_amplitude(data)
         solved = [name for name in names if exact or name not in there]
         if solved and self.sort != "sweep" and self.motion is None:
             self.result(solved[0])
         if solved:
-            data = data.assign(solve(data, solved, motion=self.motion).data_vars)
+            data = data.assign(solve_again(data, solved, motion=self.motion).data_vars)
         return by_magnitude(data.assign_attrs(picked=picked))
 
     def spread(self, dim: str, number: int) -> list[Place]:
-        """At most `number` places on an axis, from end to end, in even steps if a few less have them."""
+        """Return up to `number` places on an axis, from end to end.
+
+        There may be one or two less if that makes the steps even.
+        """
         size = self.data.sizes[dim]
         most = min(number, size)
         number = next(
@@ -231,13 +249,32 @@ class Result:
         keep: Sequence[str] = (),
         same: Sequence[str] = (),
     ) -> Sheet:
-        """The slice of a chart that needs some results, in panels.
+        """Return the sheet of a chart, with a slice of some results in panels.
 
-        It is drawn over `x`, or over the first of these axes that is there, or another that the
-        user chooses: axes of the first result.  `y` has axes for the ordinate of a map, and
-        `curves` those that may tell curves apart, in order of preference.  `keep` stays, too, whole
-        or at the values requested; of `same`, along which the results do not vary, no panels are
-        made.  InputError: an axis that was chosen is not there, or none is left.
+        All axes are those of the first result.
+
+        Parameters
+        ----------
+        options
+            What the user has chosen.
+        names
+            Results that the chart needs.
+        x
+            Axis of the abscissa; or axes, of which the first that is there is taken unless the user
+            chooses one.
+        y
+            Axes for the ordinate of a map, in order of preference.
+        curves
+            Axes that may tell curves apart, in order of preference; None if there is one curve.
+        keep
+            Further axes that stay, whole or at the values requested.
+        same
+            Axes along which the results do not vary: they make no panels.
+
+        Raises
+        ------
+        InputError
+            An axis that was chosen is not there, or none is left.
         """
         places = self.places(options.at)
         kept: dict[str, Kept] = {dim: places.get(dim, slice(None)) for dim in keep}
@@ -250,7 +287,8 @@ class Result:
         across = x if isinstance(x, str) else self._axis(options, "x", wide, x)
         if isinstance(x, str) and options.x is not None:
             raise InputError(
-                f"{self.name}: --x {options.x}: not with this chart, which is drawn over another quantity"
+                f"{self.name}: --x {options.x}: not with this chart, which is drawn over another "
+                "quantity"
             )
         rest = [dim for dim in groups if dim != across]
         up: str | None = None
@@ -261,7 +299,8 @@ class Result:
         elif options.y is not None:
             if curves is None:
                 raise InputError(
-                    f"{self.name}: --y {options.y}: not with a chart over one axis, --x; use --panels"
+                    f"{self.name}: --y {options.y}: not with a chart over one axis, --x; use "
+                    "--panels"
                 )
             up = self._axis(options, "y", rest, ())
         elif curves is not None:
@@ -273,7 +312,7 @@ class Result:
             if dim in options.at and dim not in keep:
                 why = "is an axis of this chart; it cannot have one value"
                 raise InputError(f"{self.name}: {dim} = {options.at[dim]}: {why}")
-        # more than one value for every two dots on paper are lost
+        # paper does not resolve more points
         thinned = {
             dim: slice(0, size, math.ceil(size / _POINTS)) for dim, size in self.data.sizes.items()
         }
@@ -284,7 +323,7 @@ class Result:
         if options.more_panels and not panels:
             panels = [dim for dim in groups if dim not in (*kept, *same, *options.at)]
         for name in panels[:2]:
-            self.known(
+            self.checked(
                 name,
                 [dim for dim in groups if dim not in kept],
                 f"--panels {name}: must be another axis",
@@ -306,25 +345,26 @@ class Result:
         preferred: Sequence[str],
         more: str = "",
     ) -> str:
-        """The axis that an option names, or the first of those preferred, or any that is left for it."""
-        given: str | None = getattr(options, option)
-        if given is not None:
-            return self.known(given, there, f"--{option} {given}: no such axis", more)
+        """Return the axis that an option names, else the first preferred one, else any left."""
+        chosen: str | None = getattr(options, option)
+        if chosen is not None:
+            return self.checked(chosen, there, f"--{option} {chosen}: no such axis", more)
         free = [
             dim for dim in there if dim not in (*options.panels, *options.at, options.x, options.y)
         ]
-        found = next((dim for dim in (*preferred, *free) if dim in free), None)
-        if found is None:
+        axis = next((dim for dim in (*preferred, *free) if dim in free), None)
+        if axis is None:
             fixed = f"; --at fixes {', '.join(options.at)}" if options.at else ""
             hint = "" if more else f"; {_OF_ONE_CELL}"
             raise InputError(
-                f"{self.name}: this chart needs {'another' if more else 'an'} axis with two values or more{more}; "
-                f"there are: {', '.join(there) or 'none'}{fixed}{hint}"
+                f"{self.name}: this chart needs {'another' if more else 'an'} axis with two values "
+                f"or more{more}; there are: {', '.join(there) or 'none'}{fixed}{hint}"
             )
-        return found
+        return axis
 
 
 def _sort(data: xr.Dataset) -> str:
+    """Return the sort of a result (`Result.sort`)."""
     for sort, names in OTHER_SORTS.items():
         if any(name in data for name in names):
             return sort
@@ -332,4 +372,5 @@ def _sort(data: xr.Dataset) -> str:
         return "statistics"
     if not is_recorded(data):
         return "sweep"
-    return "suite" if any("motion" in one.dims for one in data.data_vars.values()) else "record"
+    has_motions = any("motion" in variable.dims for variable in data.data_vars.values())
+    return "suite" if has_motions else "record"

@@ -9,16 +9,17 @@ from matplotlib.patches import Patch
 from slipsweep.charts import style
 from slipsweep.charts.sheet import Sheet, curve_looks, log_axis, plot_curve
 from slipsweep.charts.slices import Result
-from slipsweep.charts.solved import DRIVES
 from slipsweep.charts.style import BLUE, VERMILION, Look, Options
 from slipsweep.errors import InputError
 from slipsweep.files.selection import axis_labels
+from slipsweep.model.units import in_mm
 from slipsweep.model.variables import PARAMETERS, STRENGTHS, SensitivityStatus
+from slipsweep.studies.solved_again import DRIVES
 
-#: What statistics are drawn over, in order of preference.
+#: Axes that statistics are drawn over, in order of preference.
 _AXES = (*DRIVES, *STRENGTHS)
 
-#: Sobol indices, and how they are drawn: name, interval, text, colour of bars.
+#: Sobol indices: name, interval, words, colour of bars.
 _INDICES = (
     ("total_index", "total_interval", "total", VERMILION),
     ("first_order_index", "first_order_interval", "first order", BLUE),
@@ -27,7 +28,7 @@ _FIRST_ORDER: Look = {"linestyle": (0, (3, 1.5)), "linewidth": 1.0}
 
 
 def fragility(result: Result, options: Options) -> Figure:
-    """The probability of exceeding a displacement over one axis, a curve for each threshold."""
+    """Draw the probability of exceeding a displacement over one axis, a curve a threshold."""
     if options.levels:
         raise InputError(
             f"{result.name}: levels: not with statistics, whose thresholds are those in the file"
@@ -37,7 +38,7 @@ def fragility(result: Result, options: Options) -> Figure:
 
 
 def draw_fragility(sheet: Sheet) -> Figure:
-    """Curves of `exceedance_probability` of a slice, and the share of samples without a value, where there are any."""
+    """Draw curves of `exceedance_probability`, and the share of samples without a value."""
     thresholds = sheet.data["threshold"]
     fixed = style.length_text(thresholds.item()) if thresholds.ndim == 0 else None
     symbol = style.displacement_symbol(sheet.data.attrs)
@@ -53,22 +54,22 @@ def draw_fragility(sheet: Sheet) -> Figure:
         if shares.any():
             dotted = panel.axes.plot(panel.xs, shares.max(axis=0), color="0.4", linestyle=":")
             sheet.legend["no value (share)"] = dotted[0]
-        given = f"{symbol} > d" if fixed is None or sheet.y is None else f"{symbol} > {fixed}"
-        panel.axes.set(ylim=(-0.02, 1.02), ylabel=f"probability of exceedance P({given})")
+        event = f"{symbol} > d" if fixed is None or sheet.y is None else f"{symbol} > {fixed}"
+        panel.axes.set(ylim=(-0.02, 1.02), ylabel=f"probability of exceedance P({event})")
     return sheet.done()
 
 
 def quantiles(result: Result, options: Options) -> Figure:
-    """Bands between quantiles of the permanent displacement over one axis."""
+    """Draw bands between quantiles of the permanent displacement over one axis."""
     sheet = result.sheet(
         options, ["displacement_quantile", "valueless_share"], _AXES, keep=["quantile"]
     )
-    everything = sheet.data["displacement_quantile"].values * 1000.0
+    everything = in_mm(sheet.data["displacement_quantile"].values)
     shares = np.atleast_1d(sheet.data["quantile"].values)
     for panel in sheet.panels:
         label = f"{style.displacement_text(sheet.data.attrs)} (mm)"
         floor = log_axis(panel.axes, everything, label, zeros=True)
-        values = panel.grid("displacement_quantile", "quantile", panel.x) * 1000.0
+        values = in_mm(panel.grid("displacement_quantile", "quantile", panel.x))
         shown = np.maximum(values, floor)
         xs = panel.xs
         middle = shares.size // 2
@@ -90,12 +91,16 @@ def quantiles(result: Result, options: Options) -> Figure:
 
 
 def sensitivity(result: Result, options: Options) -> Figure:
-    """Sobol indices of every input with their 95 % intervals: curves over an axis, or bars at one grid point."""
+    """Draw Sobol indices of every input with their 95 % intervals.
+
+    They are curves over an axis, or bars at one grid point.
+    """
     if "total_index" not in result.variables:
         raise InputError(
-            f"{result.name}: holds no Sobol indices; sensitivity = true in [uncertainty] computes them"
+            f"{result.name}: holds no Sobol indices; sensitivity = true in [uncertainty] computes "
+            "them"
         )
-    names = [name for one in _INDICES for name in one[:2]] + ["sensitivity_status"]
+    names = [name for index in _INDICES for name in index[:2]] + ["sensitivity_status"]
     left = [
         dim for dim in result.wide if dim in PARAMETERS and dim in result.data["total_index"].dims
     ]
@@ -103,7 +108,9 @@ def sensitivity(result: Result, options: Options) -> Figure:
     sheet = result.sheet(options, names, "input" if bars else _AXES, keep=["bound", "input"])
     status = {*sheet.data["sensitivity_status"].values.flat}
     reasons = [
-        one.text for one in SensitivityStatus if one in status and one != SensitivityStatus.COMPUTED
+        code.text
+        for code in SensitivityStatus
+        if code in status and code != SensitivityStatus.COMPUTED
     ]
     if not np.isfinite(sheet.data["total_index"]).any():
         raise InputError(
@@ -113,7 +120,7 @@ def sensitivity(result: Result, options: Options) -> Figure:
         sheet.note(f"No indices where {text}.")
     inputs = axis_labels(sheet.data, "input")
     symbols = [
-        " + ".join(style.SYMBOLS.get(one, style.plain(one)) for one in name.split("+"))
+        " + ".join(style.SYMBOLS.get(part, style.plain(part)) for part in name.split("+"))
         for name in inputs
     ]
     if bars:
@@ -142,7 +149,7 @@ def sensitivity(result: Result, options: Options) -> Figure:
 
 
 def _draw_bars(sheet: Sheet, symbols: list[str]) -> None:
-    """Both indices of every input, the largest total index first."""
+    """Draw both indices of every input as bars, the largest total index first."""
     order = np.argsort(sheet.data["total_index"].sum(sheet.along).values)
     for panel in sheet.panels:
         for (name, interval, text, colour), shift in zip(_INDICES, (0.2, -0.2), strict=True):
@@ -151,7 +158,7 @@ def _draw_bars(sheet: Sheet, symbols: list[str]) -> None:
             at = np.arange(len(order)) + shift
             panel.axes.barh(at, values, height=0.36, color=colour)
             sheet.legend[text] = Patch(color=colour)
-            # a bootstrap's interval may, by a hair, not hold the estimate; NaN: there is none
+            # the interval of a bootstrap may end just beside the estimate; NaN: there is none
             ends = np.maximum([values - low, high - values], 0.0)
             panel.axes.errorbar(values, at, xerr=ends, fmt="none", color="black", capsize=2.5)
         panel.axes.set_yticks(np.arange(len(order)), [symbols[at] for at in order])
@@ -164,7 +171,10 @@ def _draw_bars(sheet: Sheet, symbols: list[str]) -> None:
 
 
 def _ends(sheet: Sheet, intervals: bool) -> tuple[float, float]:
-    """Ends of the axis of indices: 0 to 1 and what lies beyond, of intervals not more than half as much again."""
+    """Return the ends of the axis of indices, 0 and 1, or beyond if indices are.
+
+    Intervals extend it to −0.5 and 1.5 at most.
+    """
     values = [sheet.data[name].values.ravel() for name, *_ in _INDICES]
     values += (
         [np.clip(sheet.data[name].values.ravel(), -0.5, 1.5) for _, name, *_ in _INDICES]

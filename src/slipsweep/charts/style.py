@@ -1,4 +1,4 @@
-"""How charts look and what they say: options, colours, symbols, units, labels, captions, cautions."""
+"""Options, colours, symbols, units, labels, words and captions of charts."""
 
 import json
 import re
@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from slipsweep.errors import InputError
 from slipsweep.model import variables
 from slipsweep.model.options import MODELS
-from slipsweep.model.units import quantity
+from slipsweep.model.parameter_table import PARAMETER_TABLE
+from slipsweep.model.units import in_mm, quantity
 from slipsweep.model.variables import (
     INTENSITY_MEASURES,
     PARAMETERS,
@@ -38,7 +39,7 @@ Floats = NDArray[np.float64]
 #: Properties of an artist, by the names that matplotlib gives them.
 Look = dict[str, Any]
 
-#: Attributes of all results that charts show, by name; and of all that an axis can have.
+#: Attributes of all results that charts show, and of all quantities that an axis can have.
 SHOWN = (
     variables.LIMIT_RESULTS
     | variables.REQUIRED_RESULTS
@@ -50,7 +51,7 @@ _ABOUT = (
     INTENSITY_MEASURES | SHOWN | PARAMETERS | {"displacement": variables.TOLERABLE_DISPLACEMENT}
 )
 
-#: Okabe and Ito's colours: told apart with any kind of colour vision, and in grey.
+#: Colours of Okabe and Ito: told apart with any kind of colour vision, and in grey.
 BLUE = "#0072B2"
 VERMILION = "#D55E00"
 
@@ -61,42 +62,16 @@ COLOURS = LinearSegmentedColormap.from_list(
 )
 
 #: Symbols of the paper.
-SYMBOLS = {
-    "theta": "θ",
-    "mu_s": "μs",
-    "phi": "φ",
-    "amplitude": "A",
-    "displacement_amplitude": "d",
-    "frequency": "f",
-    "yield_acceleration": "Üy",
-    "decay_rate": "λ",
-    "delta_mu": "Δμ",
-    "minimum_friction": "μmin",
-    "residual_mu": "μr",
-    "residual_phi": "φr",
-    "weakening_distance": "D",
-    "fast_mu": "μf",
-    "rate_constant": "a",
-    "structure_frequency": "fs",
-    "yield_coefficient": "ky",
-    "upslope_yield_acceleration": "Üy,up",
-    "scale": "scale",
-    "pgv": "PGV",
-    "arias_intensity": "Ia",
-    "time_scale": "time scale",
-    "polarity": "polarity",
-    "azimuth": "azimuth",
-    "displacement": "u",
-}
+SYMBOLS = {row.name: row.symbol for row in PARAMETER_TABLE} | {"displacement": "u"}
 
-#: What sliding modes are called in legends and captions.
+#: Sliding modes in legends and captions.
 MODE_TEXT = {
     SlidingMode.STUCK: "no sliding",
     SlidingMode.STICK_SLIP: "stick–slip",
     SlidingMode.CONTINUOUS: "continuous",
 }
 
-#: What flags are called in legends and short captions.
+#: Flags in legends and short captions.
 FLAG_TEXT = {
     Validity.STATICALLY_UNSTABLE: "slides under its own weight",
     Validity.UPLIFT: "loses contact",
@@ -116,7 +91,7 @@ NEWMARK = "Newmark's block"
 NO_SLIDING = MODE_TEXT[SlidingMode.STUCK]
 UNSOUND = "falls with A, or below\nhalf of Newmark's"
 
-#: How the lines of yield and of the mode limit are drawn.
+#: Words and looks of the lines of yield and of the mode limit.
 LINES: dict[str, tuple[str, Look]] = {
     "yield_line": ("yield", {"color": "black", "linestyle": "-", "linewidth": 1.6}),
     "limit_line": (
@@ -130,11 +105,11 @@ _UNITS = {"degree": "°", "m s-2": "m/s²", "m s-1": "m/s", "1": ""}
 
 @dataclass
 class Options:
-    """What a user chooses about a chart: the parameters of `SlipsweepAccessor.chart`, checked (InputError).
+    """Options of a chart, checked: the parameters of `SlipsweepAccessor.chart`.
 
-    With `more_panels` panels lie along axes that would have one value otherwise.  `heights` has the
-    levels as numbers in the variable's own unit, in order; `inches` the width of the figure, None
-    for the usual one.
+    With `more_panels` panels lie along axes that would have one value otherwise.  `heights` are the
+    levels as numbers in the variable's own unit, in order.  `inches` is the width of the figure, or
+    None for the usual one.  InputError: an option has a value that is not allowed.
     """
 
     x: str | None = None
@@ -157,15 +132,17 @@ class Options:
     inches: float | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
-        own = "m" if SHOWN.get(self.variable, {}).get("units") == "m" else "1"
-        found = {
-            quantity("levels", one, own, 1.0) if isinstance(one, str) else float(one)
-            for one in self.levels
+        unit_of_levels = "m" if SHOWN.get(self.variable, {}).get("units") == "m" else "1"
+        heights = {
+            quantity("levels", entry, unit_of_levels, 1.0)
+            if isinstance(entry, str)
+            else float(entry)
+            for entry in self.levels
         }
-        for level in found:
+        for level in heights:
             if not 0 < level < float("inf"):
                 raise InputError(f"levels: {level:g}: must be > 0")
-        self.heights = sorted(found)
+        self.heights = sorted(heights)
         self.equations = check_equations(self.equations)
         if self.magnitude is not None and not self.equations:
             raise InputError(f"magnitude = {self.magnitude}: only with equations")
@@ -182,7 +159,7 @@ class Options:
 
     @property
     def is_narrow(self) -> bool:
-        """True if the figure is for a column of a journal: smaller text, and the legend above."""
+        """True if the figure fits a column of a journal: smaller text, and the legend above."""
         return self.inches is not None and self.inches < 5.0
 
     @property
@@ -196,16 +173,16 @@ class Options:
         return 7.0 if self.is_narrow else 10.0
 
     def scale(self, name: str, g: float) -> float:
-        """Factor by which a parameter is drawn."""
+        """Return the factor by which a parameter is drawn."""
         return 1.0 / g if self.units == "g" and is_acceleration(name) else 1.0
 
     def unit(self, name: str) -> str:
-        """The unit that a parameter or result is drawn in, as people write it."""
+        """Return the unit that a parameter or result is drawn in."""
         return "g" if self.units == "g" and is_acceleration(name) else unit(name)
 
 
 def ratio_colours(number: int) -> ListedColormap:
-    """Colours of ratios, `number` below 1 (orange) and above (blue), darker from least to largest; grey at 1."""
+    """Return colours of ratios: `number` below 1 (orange), grey at 1, `number` above (blue)."""
     below, above = (
         LinearSegmentedColormap.from_list("", ends)(np.linspace(0, 1, number))
         for ends in (["#FFF4DF", "#F0BE7E"], ["#A4BCDC", "#3C68A8"])
@@ -214,14 +191,14 @@ def ratio_colours(number: int) -> ListedColormap:
 
 
 def to_grey(colour: Any) -> Any:
-    """A colour, or an array of them, by its lightness alone."""
+    """Return a colour, or an array of them, as grey of the same lightness."""
     rgba = to_rgba_array(colour)
     grey = rgba[:, :3] @ (0.299, 0.587, 0.114)
     return np.column_stack([grey, grey, grey, rgba[:, 3]])
 
 
 def to_light_grey(colour: Any) -> Any:
-    """As `to_grey`, lighter: no darker than black lines and hatches show on."""
+    """Return grey that is light enough for black lines and hatches on it."""
     grey = to_grey(colour)
     grey[:, :3] = 0.3 + 0.7 * grey[:, :3]
     return grey
@@ -233,13 +210,13 @@ def is_acceleration(name: str) -> bool:
 
 
 def unit(name: str) -> str:
-    """The unit of a parameter, result or intensity measure as people write it; nothing for a pure number."""
+    """Return the unit of a quantity as people write it, empty for a pure number."""
     units: str = _ABOUT[name].get("units", "1")
     return _UNITS.get(units, units)
 
 
 def axis_label(name: str, options: Options) -> str:
-    """The label of a parameter's axis: name, symbol and unit."""
+    """Return the label of a parameter's axis: name, symbol and unit."""
     text = _ABOUT[name]["long_name"]
     if SYMBOLS[name] != name.replace("_", " "):
         text = f"{text.split(',')[0].split(' that ')[0]} {SYMBOLS[name]}"
@@ -248,18 +225,18 @@ def axis_label(name: str, options: Options) -> str:
 
 
 def displacement_symbol(attributes: Mapping[Any, Any]) -> str:
-    """Symbol of the permanent displacement as it is drawn: |u| of a block that slides both ways."""
+    """Return the symbol of the displacement as drawn: |u| for a block that slides both ways."""
     return "|u|" if has_signed_displacements(attributes) else "u"
 
 
 def displacement_text(attributes: Mapping[Any, Any]) -> str:
-    """Words for the permanent displacement as it is drawn, on axes."""
+    """Return the words on axes for the permanent displacement as it is drawn."""
     magnitude = "magnitude of the " if has_signed_displacements(attributes) else ""
     return f"{magnitude}permanent displacement"
 
 
 def result_text(attributes: Mapping[Any, Any], name: str) -> str:
-    """Words for a result as it is drawn, on axes."""
+    """Return the words on axes for a result as it is drawn."""
     if name in SIGNED and has_signed_displacements(attributes):
         text = str(RESULTS[name]["long_name"]).removesuffix(", downslope")
         return f"magnitude of the {text}"
@@ -267,17 +244,17 @@ def result_text(attributes: Mapping[Any, Any], name: str) -> str:
 
 
 def with_unit(text: str, units: str) -> str:
-    """A number and its unit: ``5°``, ``3 Hz``."""
+    """Return a number with its unit: ``5°``, ``3 Hz``."""
     return f"{text}{units}" if units in ("", "°") else f"{text} {units}"
 
 
 def length_text(metres: float) -> str:
-    """A displacement as people write it: ``30 mm``, ``2 m``."""
-    return f"{metres * 1000:.4g} mm" if metres < 0.9999 else f"{metres:.4g} m"
+    """Return a displacement with its unit: ``30 mm``, ``2 m``."""
+    return f"{in_mm(metres):.4g} mm" if metres < 0.9999 else f"{metres:.4g} m"
 
 
 def value_text(data: xr.Dataset, name: str, value: float, options: Options) -> str:
-    """A parameter's value with symbol and unit: ``θ = 5°``."""
+    """Return a parameter's value with symbol and unit: ``θ = 5°``."""
     if name == "threshold":
         return f"d = {length_text(value)}"
     if name not in SYMBOLS:
@@ -287,17 +264,17 @@ def value_text(data: xr.Dataset, name: str, value: float, options: Options) -> s
 
 
 def plain(text: Any) -> str:
-    """A name that users give, as matplotlib draws it as it stands: a ``$`` begins no formula."""
+    """Return a user's text so that matplotlib draws it as it is: ``$`` begins no formula."""
     return str(text).replace("$", r"\$")
 
 
 def flag_name(flag: int) -> str:
-    """A flag as results, legends and captions name it."""
+    """Return the name of a flag, as in results."""
     return (Validity(flag).name or "").lower()
 
 
 def caption(data: xr.Dataset, options: Options | None = None) -> str:
-    """Describe what has one value, the uncertain inputs, the model and the shaking, in lines.
+    """Return lines with parameters of one value, uncertain inputs, model and shaking.
 
     A short caption leaves out the options of the model and the equations of the estimates.
     """
@@ -326,7 +303,7 @@ _WORDS: dict[Any, str] = {
 
 
 def model_text(attributes: Mapping[Any, Any]) -> str:
-    """What is estimated in a result, its model and its shaking, on two lines."""
+    """Return the estimated inputs of a result, its model and its shaking, on two lines."""
     model = MODELS.from_attributes(attributes)
     words = [
         _WORDS[model.name],
@@ -337,7 +314,7 @@ def model_text(attributes: Mapping[Any, Any]) -> str:
 
 
 def short_model_text(attributes: Mapping[Any, Any]) -> str:
-    """Name the model, its shaking and the estimated inputs, on one line."""
+    """Return the model, its shaking and the estimated inputs, on one line."""
     model = _WORDS[MODELS.from_attributes(attributes).name]
     if has_signed_displacements(attributes):
         model += f", {_WORDS['both']}"
@@ -351,6 +328,7 @@ def short_model_text(attributes: Mapping[Any, Any]) -> str:
 
 
 def _shaking_text(attributes: Mapping[Any, Any]) -> str:
+    """Return the record, suite or waveform of a result in words."""
     recorded = next((name for name in ("record", "suite") if name in attributes), None)
     if recorded is None:
         return str(WAVEFORMS.from_attributes(attributes))
@@ -360,22 +338,30 @@ def _shaking_text(attributes: Mapping[Any, Any]) -> str:
 
 
 def drawn_text(attributes: Mapping[Any, Any]) -> str:
-    """The distributions of uncertain inputs: ``μs ~ lognorm(s=0.1, scale=0.4), A × lognorm(s=0.3)``; empty if none."""
+    """Return the distributions of uncertain inputs; empty if there are none.
+
+    For example ``μs ~ lognorm(s=0.1, scale=0.4), A × lognorm(s=0.3)``.
+    """
     if "uncertain" not in attributes:
         return ""
     signs = {"absolute": "~", "factor": "×", "offset": "+"}
     texts = []
-    for name, given in json.loads(attributes["uncertain"]).items():
+    for name, distribution in json.loads(attributes["uncertain"]).items():
         numbers = ", ".join(
-            f"{key}={value}" for key, value in given.items() if key not in ("distribution", "kind")
+            f"{key}={value}"
+            for key, value in distribution.items()
+            if key not in ("distribution", "kind")
         )
-        texts.append(f"{SYMBOLS[name]} {signs[given['kind']]} {given['distribution']}({numbers})")
+        texts.append(
+            f"{SYMBOLS[name]} {signs[distribution['kind']]} "
+            f"{distribution['distribution']}({numbers})"
+        )
     pooled = f"{plain(attributes['pooled'])} x " if "pooled" in attributes else ""
     return f"{', '.join(texts)}; {pooled}{attributes.get('samples', '?')} samples"
 
 
 def check_attributes(attrs: Mapping[Any, Any], name: str) -> None:
-    """Refuse a result that does not say what was solved (InputError)."""
+    """Raise InputError for a result whose attributes lack the model or the shaking."""
     recorded = not {"record", "suite"}.isdisjoint(attrs)
     options = ("rise", "recoupling") if attrs.get("model") == "mendez" else ()
     for key in ("model", "g", *(() if recorded else ("cycles", "waveform")), *options):

@@ -1,8 +1,8 @@
-"""The command line: one file a command, or a few of one kind, put together and run here.
+"""The command line: the program, which runs the commands of the other modules.
 
-Exit status 0: done; 1: the run failed; 2: a bad command or sweep file; 130: Ctrl-C.  What a user
-can mend is said in one line, never a traceback.  What a command needs is imported inside it, so
-that `slipsweep --help` is there at once.
+Exit status 0: done; 1: the run failed; 2: a bad command or sweep file; 130: Ctrl-C.  A mistake of a
+user gives one line, never a traceback.  Commands import their modules when they run, so that
+`slipsweep --help` is fast.
 """
 
 import os
@@ -16,7 +16,7 @@ import typer
 from typer.core import TyperGroup
 
 from slipsweep._version import __version__
-from slipsweep.cli import calibrate, chart, hazard, info, limit, run, simulate
+from slipsweep.cli import calibrate, chart, export, hazard, info, limit, run, simulate
 from slipsweep.cli.common import echo
 from slipsweep.cli.letters import SPELL
 from slipsweep.cli.options import app
@@ -24,13 +24,13 @@ from slipsweep.errors import InputError, RunError, RunWarning
 
 
 class _Commands(TyperGroup):
-    """The program; what its commands raise becomes a line and an exit status."""
+    """The program; an error of a command becomes a line and an exit status."""
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command."""
         try:
             super().invoke(ctx)
-            sys.stdout.flush()  # a full disk or a reader that went away is noticed here, and not at the exit
+            sys.stdout.flush()  # a full disk or a closed pipe is an error here, not at the exit
         except BrokenPipeError:
             raise  # typer ends quietly
         except KeyboardInterrupt as error:
@@ -39,7 +39,7 @@ class _Commands(TyperGroup):
             raise typer.Exit(130) from None
         except (InputError, RunError, OSError, MemoryError) as error:
             is_input = isinstance(error, InputError)
-            # notes of bad input are of the files of a suite, say: one each
+            # bad input may have several notes, for example one for each file of a suite
             lines = ("\n  " if is_input else "; ").join(
                 (_message(error), *getattr(error, "__notes__", ()))
             )
@@ -63,7 +63,7 @@ def _show_warning(
     file: TextIO | None = None,
     line: str | None = None,
 ) -> None:
-    """Print a warning of the program in one line; those of libraries as Python does."""
+    """Print a warning of the program in one line, and a warning of a library as Python does."""
     if issubclass(category, RunWarning):
         echo(f"slipsweep: warning: {message}", err=True)
     else:
@@ -84,7 +84,11 @@ def _show_versions(requested: bool) -> None:
         raise typer.Exit
 
 
-@app.callback(cls=_Commands)
+@app.callback(
+    cls=_Commands,
+    help="Permanent displacement of a rigid block on a shaken inclined base, over grids of "
+    "parameters.",
+)
 def _options(
     version: Annotated[
         bool,
@@ -102,13 +106,15 @@ def _options(
         ),
     ] = False,
 ) -> None:
-    """Permanent displacement of a rigid block on a shaken inclined base, over grids of parameters."""
+    """Declare the options of the program itself; they act through their callbacks."""
 
 
 #: Modules of the commands, in the order of the help.
-_MODULES = [one.__name__ for one in (run, simulate, limit, hazard, chart, info, calibrate)]
+_MODULES = [
+    module.__name__ for module in (run, simulate, limit, hazard, chart, info, export, calibrate)
+]
 app.registered_commands.sort(
-    key=lambda one: _MODULES.index(one.callback.__module__ if one.callback else "")
+    key=lambda command: _MODULES.index(command.callback.__module__ if command.callback else "")
 )
 
 
@@ -117,11 +123,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     os.environ["MPLBACKEND"] = "agg"  # figures go to files only
     try:
         Path.home()
-    except RuntimeError:  # no HOME and no account: libraries that look for their settings find none
+    except RuntimeError:  # no HOME and no account: libraries then find no settings
         os.environ["HOME"] = os.devnull
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors=SPELL)  # an alphabet without λ fails no command
+            stream.reconfigure(errors=SPELL)  # λ is spelled out where the encoding has none
     words = list(sys.argv[1:] if arguments is None else arguments)
     with warnings.catch_warnings():
         warnings.showwarning = _show_warning

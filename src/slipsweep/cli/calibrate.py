@@ -60,10 +60,12 @@ class Measured:
         Texts, TEST("Channel that drifts linearly, or all; may be repeated.", "CHANNEL")
     ] = None
 
-    def given(self, g: float) -> dict[str, Any]:
-        """The same as Python's functions take it."""
-        removed = (("offset", self.offset), ("drift", self.drift))
-        channels = {name: "all" if one == ["all"] else one or [] for name, one in removed}
+    def arguments(self, g: float) -> dict[str, Any]:
+        """Return the options as arguments of `measured_friction` and `calibrate`."""
+        typed = {"offset": self.offset, "drift": self.drift}
+        channels = {
+            name: "all" if names == ["all"] else names or [] for name, names in typed.items()
+        }
         return vars(self) | options.in_own_units(vars(self), g) | channels
 
 
@@ -90,12 +92,12 @@ def friction(
     quiet: options.Quiet = False,
 ) -> None:
     """Compute the friction over a test by Eq. 1 and by statics, and its slides."""
-    given = measured.given(g)
+    arguments = measured.arguments(g)
     least = None if threshold is None else quantity("--threshold", threshold, "m s-2", g)
     paths = outputs.check_outputs(output, overwrite, reads=[test], endings=(".nc", *FIGURES))
-    from slipsweep.studies.friction import measured_friction
+    from slipsweep.studies.calibration.measured_friction import measured_friction
 
-    table = measured_friction(test, **given, g=g, rest=rest, threshold=least)
+    table = measured_friction(test, **arguments, g=g, rest=rest, threshold=least)
     common.write_outputs(paths, overwrite, table)
     if quiet:
         return
@@ -114,7 +116,8 @@ def friction(
 @command(
     "Tests on a shaking table",
     "slipsweep calibrate test.csv --theta 5 --mu-s 0.38 -o calibration.nc -o calibration.png",
-    "slipsweep calibrate strong.csv weak.csv --theta 5 --mu-s 0.38 --drift relative_displacement -o model.toml",
+    "slipsweep calibrate strong.csv weak.csv --theta 5 --mu-s 0.38 --drift relative_displacement "
+    "-o model.toml",
 )
 def calibrate(
     *,
@@ -131,14 +134,15 @@ def calibrate(
     quiet: options.Quiet = False,
 ) -> None:
     """Estimate yield acceleration, λ and Δμ from one or several tests."""
-    given = measured.given(model.g)
+    arguments = measured.arguments(model.g)
     paths = outputs.check_outputs(
         output, overwrite, reads=tests, endings=(".nc", ".toml", *FIGURES)
     )
-    from slipsweep.studies import calibration
+    from slipsweep.studies.calibration.calibrate import calibrate
+    from slipsweep.studies.calibration.sweep_tables import sweep_file_text
 
-    table = calibration.calibrate(tests, **given, model=model, cycles=cycles)
-    text = calibration.sweep_file_text(table.attrs["model_table"], table.attrs["uncertainty_table"])
+    table = calibrate(tests, **arguments, model=model, cycles=cycles)
+    text = sweep_file_text(table.attrs["model_table"], table.attrs["uncertainty_table"])
     common.write_outputs(paths, overwrite, table, toml=lambda: text)
     if quiet:
         return
@@ -168,7 +172,7 @@ def calibrate(
 
 
 def _echo_coefficients(table: "xr.Dataset", *lines: str) -> None:
-    """That the friction is constant, and static and kinetic friction by statics, where the block was seen to slide."""
+    """Print static and kinetic friction by statics, and if friction is constant."""
     echo(*filter(None, [table.attrs["constant_friction"]]), *lines)
     for kind in ("static", "kinetic"):
         if f"{kind}_friction" in table and table[f"{kind}_friction"].notnull():
@@ -178,32 +182,34 @@ def _echo_coefficients(table: "xr.Dataset", *lines: str) -> None:
 
 
 def _echo_parameters(table: "xr.Dataset") -> None:
-    """The parameters, their correlation, and the misfit of each channel in each test."""
+    """Print the parameters, their correlation, and the misfit of each channel in each test."""
     import pandas as pd
 
-    from slipsweep.motion.shaking import RESPONSES
-    from slipsweep.studies.likelihood import SOUGHT
+    from slipsweep.studies.calibration.observation import SOUGHT
+    from slipsweep.studies.calibration.shaking_test import RESPONSES
 
-    # no value where the data do not determine one
+    # a parameter that the data do not determine has no value
     rows = [
-        [table[one].where(table[f"{one}_error"] < math.inf), *table[f"{one}_interval"]]
-        for one in SOUGHT
+        [table[name].where(table[f"{name}_error"] < math.inf), *table[f"{name}_interval"]]
+        for name in SOUGHT
     ]
-    labels = [f"{one} ({table[one].attrs['units']})" for one in SOUGHT]
-    found = pd.DataFrame(rows, labels, ["value", "95 % from", "to"], dtype=float)
+    labels = [f"{name} ({table[name].attrs['units']})" for name in SOUGHT]
+    parameters = pd.DataFrame(rows, labels, ["value", "95 % from", "to"], dtype=float)
     echo(
-        _text(found),
+        _text(parameters),
         "correlation",
         _text(pd.DataFrame(table["correlation"].values, [*SOUGHT], [*SOUGHT])),
     )
     echo("misfit, root mean square, and in parts of the largest value")
-    for name in (one for one in RESPONSES if f"misfit_{one}" in table):
+    for name in RESPONSES:
+        if f"misfit_{name}" not in table:
+            continue
         misfits, shares = (table[f"{kind}misfit_{name}"] for kind in ("", "relative_"))
         units = misfits.attrs["units"]
         pairs = zip(misfits.values.flat, shares.values.flat, strict=True)
         parts = (
-            f"{one:.2g} {units}  {share:.1%}" if one == one else "not measured"
-            for one, share in pairs
+            "not measured" if math.isnan(misfit) else f"{misfit:.2g} {units}  {share:.1%}"
+            for misfit, share in pairs
         )
         echo(f"  {name:<24}{', '.join(parts)}")
 

@@ -1,4 +1,4 @@
-"""`slipsweep chart`, `slipsweep report` and `slipsweep explore`: a result as charts, or as a page for the browser."""
+"""`slipsweep chart`, `report` and `explore`: a result as charts, or as a page for the browser."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -14,9 +14,9 @@ AXES = options.Panel("Axes")
 LOOK = options.Panel("Look")
 
 _KINDS = (
-    "contours, modes, families, curve, dimensionless, newmark or spread; of uncertain inputs fragility, quantiles or "
-    "sensitivity; of recorded motions motions, fragility, intensity or histogram; may be repeated (default: all that "
-    "fit; with one axis left, its curve)."
+    "contours, modes, families, curve, dimensionless, newmark or spread; of uncertain inputs "
+    "fragility, quantiles or sensitivity; of recorded motions motions, fragility, intensity or "
+    "histogram; may be repeated (default: all that fit; with one axis left, its curve)."
 )
 
 
@@ -63,14 +63,15 @@ def chart(
     output: Annotated[
         options.Paths,
         written(
-            "Write .png, .svg or .pdf; may be repeated (default: OUT-KIND.png). Several charts go to one .pdf."
+            "Write .png, .svg or .pdf; may be repeated (default: OUT-KIND.png). Several charts go "
+            "to one .pdf."
         ),
     ] = None,
     overwrite: options.Overwrite = False,
 ) -> None:
     """Draw design charts of a result."""
-    given = output or []
-    outputs.check_endings(given, FIGURES)
+    paths = output or []
+    outputs.check_endings(paths, FIGURES)
     beside = options.compared(equations, magnitude)
 
     from slipsweep.charts import kinds, slices, style
@@ -102,16 +103,17 @@ def chart(
         )
         result.places(look.at)
         chosen = requested or kinds.fitting(result, look)
-        look.more_panels = together = bool(given) and len(chosen) > 1
-        for path in given:
+        look.more_panels = together = bool(paths) and len(chosen) > 1
+        for path in paths:
             if together and path.suffix != ".pdf":
                 raise InputError(
-                    f"{path}: is for one chart: give one --kind, or a name that ends in .pdf for several"
+                    f"{path}: is for one chart: give one --kind, or a name that ends in .pdf for "
+                    "several"
                 )
         default = {name: Path(f"{file.stem}-{name}.png") for name in chosen}
-        outputs.check_outputs(given or [*default.values()], overwrite, reads=[file])
+        outputs.check_outputs(paths or [*default.values()], overwrite, reads=[file])
         figures, left_out = kinds.draw_all(result, chosen, look, strict=bool(requested))
-        drawn = [(path, [*figures.values()]) for path in given]
+        drawn = [(path, [*figures.values()]) for path in paths]
         for path, shown in drawn or [(default[name], [figure]) for name, figure in figures.items()]:
             with outputs.complete_or_absent(path, overwrite) as temporary:
                 if together:
@@ -151,12 +153,12 @@ def explore(
     quiet: options.Quiet = False,
 ) -> None:
     """Write a page for the browser in which to explore a result (extra \\[explore])."""
-    from slipsweep.explore import page as pages
+    from slipsweep.explore.page import write_page
     from slipsweep.grid.resources import parse_size, size_text
 
     path = output or file.with_suffix(".html")
     outputs.check_endings([path], (".html", ".htm"))
-    excerpt = pages.write_page(file, path, size=parse_size("--size", size), overwrite=overwrite)
+    excerpt = write_page(file, path, size=parse_size("--size", size), overwrite=overwrite)
     if quiet:
         return
     for dim, length in excerpt.lengths.items():

@@ -1,4 +1,4 @@
-"""What commands share that write and print: outputs checked before anything is computed, runs, figures, summaries."""
+"""Functions that commands share: write outputs, run jobs, print summaries."""
 
 import shlex
 import sys
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from slipsweep.files.jobs import Job
     from slipsweep.files.running import Report
     from slipsweep.files.storing import Place
-    from slipsweep.grid.tally import Tally
     from slipsweep.motion.records import Record
+    from slipsweep.studies.result_counts import Tally
 
-#: Attribute of a file that says what no design must rest on, a line for each reason.
+#: Attribute of a file: reasons why no design must rest on it, a line each.
 UNSOUND = "unsound"
 
 #: Endings of figures.
@@ -38,7 +38,8 @@ def write_outputs(
 ) -> None:
     """Write each output: the text of its ending, a netCDF file, or the chart.
 
-    The record that is the input goes into the netCDF file; `look` has options of the chart.
+    `recorded`, the record that was the input, is stored in the netCDF file; `look` has options of
+    the chart.
     """
     from slipsweep.files import netcdf
 
@@ -50,10 +51,10 @@ def write_outputs(
             elif path.suffix == ".nc":
                 plain = netcdf.without_time_axis(table)
                 title = table.attrs["title"]
-                found = netcdf.described(
+                described = netcdf.described(
                     plain, title=title, command=typed_command(), recorded=recorded
                 )
-                netcdf.write_table(found, temporary)
+                netcdf.write_table(described, temporary)
             else:
                 from slipsweep.charts import kinds
 
@@ -68,29 +69,30 @@ def run_job(
     unit: str = "cells",
     remarks: "Callable[[xr.Dataset], Mapping[str, str]]" = lambda results: {},
 ) -> "Report":
-    """Solve and write what a command computes, in chunks if need be.
+    """Solve a job and write its results, in chunks if need be.
 
-    `remarks` makes attributes of the results, which go into the file.
+    `remarks` makes attributes from the results, which are stored in the file.
     """
     from slipsweep.files import running
     from slipsweep.grid.resources import parse_size
 
     if large.resume and large.overwrite:
         raise InputError(
-            "--resume, --overwrite: the first continues an interrupted run, the second starts it again"
+            "--resume, --overwrite: the first continues an interrupted run, the second starts it "
+            "again"
         )
-    given = {name: value for name, value in vars(large).items() if name != "quiet"}
-    given["memory"] = None if large.memory is None else parse_size("--memory", large.memory)
+    settings = {name: value for name, value in vars(large).items() if name != "quiet"}
+    settings["memory"] = None if large.memory is None else parse_size("--memory", large.memory)
     with progress_bar(job.plan.cells, large.quiet, unit) as progress:
-        given |= {"progress": progress, "remarks": remarks}
-        report = running.run(job, path, command=typed_command(), **given)
-    if report.found and not large.quiet:
+        settings |= {"progress": progress, "remarks": remarks}
+        report = running.run(job, path, command=typed_command(), **settings)
+    if report.was_complete and not large.quiet:
         echo(f"{path}: complete already, by the same sweep; nothing was computed")
     return report
 
 
 def typed_command() -> str:
-    """The command as typed, for the history of a file."""
+    """Return the command as typed, for the history of a file."""
     return shlex.join(["slipsweep", *sys.argv[1:]])
 
 
@@ -98,7 +100,10 @@ def typed_command() -> str:
 def progress_bar(
     cells: int, quiet: bool, unit: str = "cells"
 ) -> Iterator[Callable[[int], None] | None]:
-    """Yield what to call with a number of cells done: a progress bar, if there is a terminal to see it."""
+    """Yield a function of a number of finished cells, which moves a progress bar.
+
+    Without a terminal, or if `quiet`, there is no bar, and None is yielded.
+    """
     if quiet or sys.stderr is None or not sys.stderr.isatty():
         yield None
         return
@@ -137,7 +142,7 @@ def progress_bar(
 
 
 def echo(*texts: object, err: bool = False) -> None:
-    """Print lines; text that comes from a file sends no control sequences to the terminal."""
+    """Print lines, without control sequences that the text of a file may have."""
     for text in map(str, texts):
         shown = (
             c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text
@@ -147,19 +152,22 @@ def echo(*texts: object, err: bool = False) -> None:
 
 
 def range_text(name: str, ends: Sequence[float], g: float) -> str:
-    """Values of a parameter with their unit, accelerations also in g: ``1 to 4 m/s2 (0.1019 to 0.4077 g)``."""
+    """Return values of a parameter with their unit; accelerations are also in g.
+
+    An example is ``1 to 4 m/s2 (0.1019 to 0.4077 g)``.
+    """
     units = variables.PARAMETERS[name]["units"].replace("m s-2", "m/s2")
     in_g = f" ({' to '.join(f'{end / g:.4g}' for end in ends)} g)" if units == "m/s2" else ""
     return f"{' to '.join(f'{end:.6g}' for end in ends)}{'' if units == '1' else f' {units}'}{in_g}"
 
 
 def echo_unsound(table: "xr.Dataset") -> None:
-    """Print what the file of a result says of it that no design must rest on."""
+    """Print the reasons, from the file of a result, why no design must rest on it."""
     echo(*(f"{UNSOUND}: {text}" for text in str(table.attrs.get(UNSOUND, "")).splitlines()))
 
 
 def echo_tally(tally: "Tally") -> None:
-    """Print the shares of sliding modes and of the flags that cells have, and what moves the displacement."""
+    """Print the shares of sliding modes and of flags, ratios to Newmark's, and Sobol indices."""
     if tally.modes is not None:
         echo("sliding modes:")
         echo(
@@ -172,20 +180,19 @@ def echo_tally(tally: "Tally") -> None:
         seen = variables.Validity(sum(flag for flag, count in tally.flags.items() if count))
         echo("flags (validity):" if seen or tally.unflagged else "flags (validity): none")
         if tally.unflagged:
-            echo(
-                f"  not known              {tally.share(tally.unflagged):9.2%}  {variables.UNFLAGGED_TEXT}"
-            )
+            share = f"{tally.share(tally.unflagged):9.2%}"
+            echo(f"  not known              {share}  {variables.UNFLAGGED_TEXT}")
         for kind in variables.FlagKind:
             flags = seen & variables.flags_of(kind)
             echo(*([f"  {kind}: {variables.FLAG_KIND_TEXT[kind]}"] if flags else ()))
             for flag in flags:
-                echo(
-                    f"    {(flag.name or '').lower():<22}{tally.share(tally.flags[flag]):7.2%}  {flag.text}"
-                )
+                share = f"{tally.share(tally.flags[flag]):7.2%}"
+                echo(f"    {(flag.name or '').lower():<22}{share}  {flag.text}")
     if tally.ratios is not None and tally.ratios.number:
         low, median, high = (f"{tally.ratios.quantile(share):.3g}" for share in (0.05, 0.5, 0.95))
         echo(
-            f"displacement over Newmark's, where both slide: median {median}, 5 to 95 % {low} to {high}"
+            f"displacement over Newmark's, where both slide: median {median}, "
+            f"5 to 95 % {low} to {high}"
         )
     if (indices := tally.indices) is None:
         return
@@ -194,7 +201,8 @@ def echo_tally(tally: "Tally") -> None:
     points = sum(indices.status.values())
     there = indices.status[variables.SensitivityStatus.COMPUTED]
     echo(
-        f"Sobol indices of the permanent displacement, at {there} of {points} grid points, and their means:"
+        f"Sobol indices of the permanent displacement, at {there} of {points} grid points, and "
+        "their means:"
     )
     if there:
         columns = {
@@ -210,7 +218,10 @@ def echo_tally(tally: "Tally") -> None:
 
 
 def echo_suite(table: "xr.Dataset", most: int, typed: Sequence[str] | None = None) -> None:
-    """Print the statistics of a suite or of samples, at each of `most` grid points, with P(u > d) of those typed."""
+    """Print the statistics of a suite or of samples at `most` grid points.
+
+    P(u > d) is that of the displacements `typed`.
+    """
     stored = {"permanent_displacement", "validity"} <= {
         *table.data_vars
     } and "limit_amplitude" not in table

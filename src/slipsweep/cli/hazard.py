@@ -13,13 +13,13 @@ from slipsweep.model import variables
 if TYPE_CHECKING:
     import xarray as xr
 
-#: What is needed of a result.
+#: Results that are needed.
 _NEEDED = ("permanent_displacement", "validity", "exceedance_probability", "valueless_share")
 
-#: Of the accelerations of published equations every so many goes to a fragility of OpenQuake.
+#: Every so many of the accelerations of published equations goes to a fragility of OpenQuake.
 _EVERY = 8
 
-#: The part of a rate that is worth a sentence.
+#: Part of a rate from which on it is mentioned.
 _MUCH = 0.05
 
 HAZARD = options.Panel("Hazard")
@@ -75,8 +75,8 @@ def hazard(
         fragility,
         openquake_fragility,
         published_fragility,
-        read_hazard_curve,
     )
+    from slipsweep.studies.hazard_curve import read_hazard_curve
 
     beside = options.compared(equations, magnitude) or None
     paths = outputs.check_outputs(
@@ -94,8 +94,10 @@ def hazard(
     result = chosen.squeeze([name for name in typed if name in chosen.sizes])
     g = float(table.attrs["g"])
     lengths = options.displacements(displacement, g)
-    given = read_hazard_curve(curve, g, site, unstated)
-    rates = displacement_hazard(result, given, lengths, equations=beside, magnitude=magnitude)
+    hazard_curve = read_hazard_curve(curve, g, site, unstated)
+    rates = displacement_hazard(
+        result, hazard_curve, lengths, equations=beside, magnitude=magnitude
+    )
     drawn = rates
     if any(path.suffix in FIGURES for path in paths):
         from slipsweep.charts.limits import drawn_thresholds
@@ -103,21 +105,21 @@ def hazard(
         marked = rates["threshold"].values
         more = None if "exceedance_probability" in result else drawn_thresholds(result, marked)
         drawn = displacement_hazard(
-            result, given, more, equations=beside, magnitude=magnitude
+            result, hazard_curve, more, equations=beside, magnitude=magnitude
         ).assign_attrs(marked=marked)
 
     def fragility_text() -> str:
         if beside is None:
             return openquake_fragility(fragility(result, lengths))
-        fitted = published_fragility(result, given, beside, lengths, magnitude)
+        fitted = published_fragility(result, hazard_curve, beside, lengths, magnitude)
         return openquake_fragility(fitted.isel(amplitude=slice(None, None, _EVERY)))
 
     common.write_outputs(paths, overwrite, drawn, xml=fragility_text)
     if quiet:
         return
-    low, high = (float(one) / g for one in rates.attrs["amplitude_range"])
-    start, end = (float(one) / g for one in rates.attrs["hazard_curve_range"])
-    # P is known between these, and the rate of what lies above and below is not
+    low, high = (float(edge) / g for edge in rates.attrs["amplitude_range"])
+    start, end = (float(edge) / g for edge in rates.attrs["hazard_curve_range"])
+    # between these P is known; above and below it the rate is not
     first = max(low, start)
     last = min(high, end)
     if beside is None:
@@ -160,7 +162,7 @@ def hazard(
 
 
 def _chance(rates: "xr.Dataset") -> str:
-    """Probability of exceedance in symbols."""
+    """Return the probability of exceedance in symbols."""
     symbol = "|u|" if variables.has_signed_displacements(rates.attrs) else "u"
     return f"P({symbol} > d)"
 
@@ -168,7 +170,7 @@ def _chance(rates: "xr.Dataset") -> str:
 def _suite_notes(
     rates: "xr.Dataset", first: float, last: float, first_end: str
 ) -> "dict[str, xr.DataArray]":
-    """Sentences about the rates of a suite or of samples, and where they hold."""
+    """Return sentences about the rates of a suite or of samples, and where they hold."""
     rate, held, omitted = (rates[name] for name in ("annual_rate", "held_rate", "omitted_rate"))
     axis = "the axis amplitude of the sweep" if first_end == "sweep" else "the hazard curve"
     chance = _chance(rates)
@@ -177,26 +179,31 @@ def _suite_notes(
     unstable = (
         "; those that are statically unstable count as exceeding" if what == "samples" else ""
     )
-    return {
-        f"up to {missing.max():.1%} of the {what} have no value at an amplitude: left out of P{unstable}": missing
-        > 0.0,
-        "without an annual rate: fewer than two amplitudes have a value": rate.isnull(),
-        "annual rate 0: the displacement is not exceeded at any amplitude of the result": rate
-        == 0.0,
-        f"above {last:.4g} g {chance} is taken as it is there: to compute it, extend {axis}": held
-        > _MUCH * rate,
-        f"below {first:.4g} g nothing is counted: to compute it, begin the axis amplitude lower": omitted
-        > _MUCH * rate,
+    valueless = (
+        f"up to {missing.max():.1%} of the {what} have no value at an amplitude: left out of "
+        f"P{unstable}"
+    )
+    above = f"above {last:.4g} g {chance} is taken as it is there: to compute it, extend {axis}"
+    below = f"below {first:.4g} g nothing is counted: to compute it, begin the axis amplitude lower"
+    coarse = (
         f"{chance} grows much from one amplitude to the next: the rates may be wrong by the "
-        "factors above; put more values on the axis amplitude": (
-            rates["upper_rate"] > 2.0 * rates["lower_rate"]
-        )
-        & (held < rate),
+        "factors above; put more values on the axis amplitude"
+    )
+    grows = (rates["upper_rate"] > 2.0 * rates["lower_rate"]) & (held < rate)
+    return {
+        valueless: missing > 0.0,
+        "without an annual rate: fewer than two amplitudes have a value": rate.isnull(),
+        "annual rate 0: the displacement is not exceeded at any amplitude of the result": (
+            rate == 0.0
+        ),
+        above: held > _MUCH * rate,
+        below: omitted > _MUCH * rate,
+        coarse: grows,
     }
 
 
 def _published_notes(rates: "xr.Dataset", last: float) -> "dict[str, xr.DataArray]":
-    """Sentences about the rates of published equations, and where they hold."""
+    """Return sentences about the rates of published equations, and where they hold."""
     rate, held, outside = (rates[name] for name in ("annual_rate", "held_rate", "outside_rate"))
     return {
         "without an annual rate: the block slides under its own weight": rate.isnull(),

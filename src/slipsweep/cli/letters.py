@@ -1,4 +1,4 @@
-"""Letters that are not in a terminal's encoding, spelled in those of ASCII."""
+"""Spelling in ASCII of letters that the encoding of a terminal lacks."""
 
 import codecs
 import unicodedata
@@ -6,7 +6,7 @@ import unicodedata
 #: Name of the handler of errors, for streams.
 SPELL = "slipsweep.spell"
 
-#: Letters and signs of the program that ASCII does not have, after accents are taken off.
+#: Spelling of the program's letters and signs that ASCII lacks; accents are removed before.
 _SPELLED = {
     "λ": "lambda",
     "μ": "mu",
@@ -25,7 +25,7 @@ _SPELLED = {
 
 
 def spell(error: UnicodeError) -> tuple[str, int]:
-    """Return what is printed for letters that cannot be encoded, and where to go on."""
+    """Return the spelling of letters that cannot be encoded, and the place after them."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     letters = unicodedata.normalize("NFKD", error.object[error.start : error.end])

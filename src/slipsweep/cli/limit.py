@@ -15,8 +15,8 @@ from slipsweep.model.variables import REQUIRED_STRENGTHS, LimitStatus, StrengthS
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Most grid points whose quantiles under a suite are printed, and limits that are printed one by
-#: one.
+#: Most grid points whose quantiles under a suite are printed, and most limits that are printed
+#: individually.
 _MOST_POINTS = 12
 _MOST_MOTIONS = 60
 
@@ -64,13 +64,14 @@ def limit(
     """
     from slipsweep.files import jobs, opening, spec
 
-    results = [one for one in output or () if Path(one).suffix in (".nc", ".zarr")]
+    results = [path for path in output or () if Path(path).suffix in (".nc", ".zarr")]
     if len(results) > 1:
         raise InputError(f"{results[1]}: a second result, beside {results[0]}; give one")
     for name in () if results else ("resume", "memory", "workers", "scheduler"):
         if getattr(large, name):
             raise InputError(
-                f"--{name}: needs -o OUT.nc, whose chunks are solved and written one after the other"
+                f"--{name}: needs -o OUT.nc, whose chunks are solved and written one after the "
+                "other"
             )
     solved_for = check_choice("--of", of or "amplitude", ("amplitude", *REQUIRED_STRENGTHS))
     if solved_for != "amplitude" and maximum_amplitude is not None:
@@ -79,7 +80,7 @@ def limit(
     if beside and solved_for != "yield_coefficient":
         raise InputError("--equations: only with --of yield_coefficient")
     checked = spec.load(sweep)
-    named = [Path(one) for one in output or () if one not in results]
+    named = [Path(path) for path in output or () if path not in results]
     figures = outputs.check_outputs(
         named, large.overwrite, reads=checked.files, endings=(*FIGURES, ".nc", ".zarr")
     )
@@ -90,7 +91,7 @@ def limit(
         if maximum_amplitude is None
         else quantity("--maximum-amplitude", maximum_amplitude, "m s-2", g)
     )
-    # one is one number; several are a dimension, in order and without repetition
+    # a single displacement is a number; several are a dimension, increasing and each once
     targets = lengths if len(displacement) > 1 else lengths[0]
     if solved_for == "amplitude":
         job = jobs.limit_job(checked, targets, highest)
@@ -126,9 +127,8 @@ def _print_limits(table: "xr.Dataset", g: float) -> None:
 
     limits = table["limit_amplitude"]
     status = table["limit_status"]
-    echo(
-        f"{limits.size} limits ({grid_text({str(dim): size for dim, size in limits.sizes.items()}) or 'one cell'})"
-    )
+    sizes = {str(dim): size for dim, size in limits.sizes.items()}
+    echo(f"{limits.size} limits ({grid_text(sizes) or 'one cell'})")
     if limits.notnull().any():
         values = {"smallest": limits.min(), "median": limits.median(), "largest": limits.max()}
         echo(
@@ -137,10 +137,10 @@ def _print_limits(table: "xr.Dataset", g: float) -> None:
                 for text, value in values.items()
             )
         )
-    wanted = ", ".join(f"{one:.6g}" for one in table["displacement"].values.flat)
+    lengths = ", ".join(f"{length:.6g}" for length in table["displacement"].values.flat)
     end = common.range_text("amplitude", [float(table.attrs["maximum_amplitude"])], g)
     echo(
-        f"displacement {wanted} m, searched up to {end}",
+        f"displacement {lengths} m, searched up to {end}",
         f"inputs: {table.attrs['friction_inputs']}",
     )
     if limits.sizes.get("motion", 1) > 1:
@@ -165,14 +165,16 @@ def _summarize_suite(table: "xr.Dataset", g: float) -> None:
     from slipsweep.studies.suite_statistics import limit_quantiles, point_names, suite_dims
 
     limits = table["limit_amplitude"] / g
-    found = limit_quantiles(table)
-    grid = found["value_count"].sizes
+    limit_statistics = limit_quantiles(table)
+    grid = limit_statistics["value_count"].sizes
     suite = {dim: limits.sizes[dim] for dim in suite_dims(limits)}
     points = point_names(table, grid)
-    quantiles = found["limit_quantile"].transpose(*grid, ...).values.reshape(len(points), -1) / g
+    quantiles = (
+        limit_statistics["limit_quantile"].transpose(*grid, ...).values.reshape(len(points), -1) / g
+    )
     rows = pd.DataFrame(quantiles, points, ["16 %", "median", "84 %"]).replace(np.inf, np.nan)
     rows["motions"], rows["not reached"] = (
-        found[f"{name}_count"].values.ravel() for name in ("value", "not_reached")
+        limit_statistics[f"{name}_count"].values.ravel() for name in ("value", "not_reached")
     )
     echo("limits of the suite, g; one that is not reached is larger than all others:")
     echo(rows.head(_MOST_POINTS).to_string(float_format="{:.4g}".format, na_rep="none"))

@@ -1,4 +1,4 @@
-"""`slipsweep example` and `slipsweep run`: the sweep files that come with slipsweep, and a sweep computed."""
+"""`slipsweep example`, which writes sweep files of slipsweep, and `slipsweep run`."""
 
 import math
 import time
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from slipsweep.files.spec import SweepSpec
 
-#: Factor on a recorded acceleration above which a motion is far from what was recorded.
+#: Factor on a recorded acceleration above which there is a caution.
 _LARGE_FACTOR = 4.0
 
 
@@ -50,14 +50,14 @@ def example(
     from slipsweep.files import spec
 
     # the sweep file is among the files that are read for it
-    wanted = {
+    sources = {
         path.relative_to(folder): path
         for path in spec.load(sweeps[name]).files
         if isinstance(path, Path)
     }
-    present = [path for path in wanted if path.parent.is_dir()]
-    outputs.check_outputs(present, overwrite, reads=list(wanted.values()))
-    for path, source in wanted.items():
+    present = [path for path in sources if path.parent.is_dir()]
+    outputs.check_outputs(present, overwrite, reads=list(sources.values()))
+    for path, source in sources.items():
         path.parent.mkdir(parents=True, exist_ok=True)
         with outputs.complete_or_absent(path, overwrite) as temporary:
             temporary.write_bytes(source.read_bytes())
@@ -89,15 +89,14 @@ def run(
     large: Large,
 ) -> None:
     """Compute a sweep and write it to a netCDF file or a Zarr store."""
-    from slipsweep.charts import solved
     from slipsweep.files import jobs, opening, spec, storing
     from slipsweep.grid.resources import grid_text, size_text
     from slipsweep.jit import compiling
+    from slipsweep.studies.cautions import slides_back_text, unsound_texts, why_nothing_slides
 
     checked = spec.load(sweep)
-    if (
-        solver is not None and solver != checked.solver.name
-    ):  # the same one keeps the options of the sweep file
+    # the solver of the sweep file keeps its options
+    if solver is not None and solver != checked.solver.name:
         checked = replace(checked, solver=solver_for(checked.model, solver))
     name = output or checked.output.path
     if name is None and spec.is_stream(sweep):
@@ -116,7 +115,7 @@ def run(
     def remarks(results: "xr.Dataset") -> dict[str, str]:
         nonlocal judged
         before = time.perf_counter()
-        texts = solved.unsound_texts(results)
+        texts = unsound_texts(results)
         judged += time.perf_counter() - before
         return {common.UNSOUND: "\n".join(texts)} if texts else {}
 
@@ -124,7 +123,7 @@ def run(
     if large.quiet:
         return
     template = job.plan.template()
-    if not report.found:
+    if not report.was_complete:
         cells = job.plan.cells
         grid = grid_text(job.plan.sizes) or "no axes"
         passed = time.perf_counter() - started - judged
@@ -144,9 +143,11 @@ def run(
             echo(f"{points} grid points ({grid}), {pooled}{sampling.samples} samples each{more}")
             echo(f"{cells} samples solved {took}")
     echo(f"inputs: {template.attrs['friction_inputs']}")
-    for parameter, one in template.coords.items():
+    for parameter, coordinate in template.coords.items():
         if parameter in variables.PARAMETERS:
-            ends = [one.min().item(), one.max().item()][: 2 if one.size > 1 else 1]
+            ends = [coordinate.min().item(), coordinate.max().item()][
+                : 2 if coordinate.size > 1 else 1
+            ]
             echo(f"  {parameter:<24}{range_text(str(parameter), ends, checked.model.g)}")
     if checked.recorded is not None:
         echo(checked.recorded.summary())
@@ -155,22 +156,22 @@ def run(
         echo(f"the same motion under several labels: {template.attrs['duplicate_motions']}")
     common.echo_tally(report.tally)
     result = opening.read_result(report.path)
-    echo(*filter(None, [solved.why_nothing_slides(template, report.tally)]))
+    echo(*filter(None, [why_nothing_slides(template, report.tally)]))
     common.echo_unsound(result)
-    if slides_back := solved.slides_back_text(result, checked.recorded):
+    if slides_back := slides_back_text(result, checked.recorded):
         echo(f"caution: {slides_back}")
     common.echo_suite(result, most=20)
     echo(f"{report.path}  {size_text(storing.nbytes_of(report.path))}")
 
 
 def _scaling_caution(spec: "SweepSpec") -> str | None:
-    """A line on recorded motions that are scaled by large factors; None where none is."""
-    from slipsweep.grid.inputs import Inputs
+    """Return a line on recorded motions that are scaled by large factors, or None."""
     from slipsweep.grid.plans import plan_sweep
 
-    # the factor depends on these alone; a block has to be given, whichever it is
-    names = (*variables.STRENGTHS, "time_scale", "azimuth")
-    inputs = Inputs(theta=0.0, mu_s=1.0, **{name: getattr(spec.inputs, name) for name in names})
+    # the factor depends on these alone; the plan also needs a block, and any will do
+    needed = (*variables.STRENGTHS, "time_scale", "azimuth")
+    inputs = {name: values for name, values in spec.inputs.items() if name in needed}
+    inputs |= {"theta": 0.0, "mu_s": 1.0}
     plan = plan_sweep(inputs, excitation=spec.excitation, variables=["motion_factor"])
     factors = plan.solve()["motion_factor"]
     largest = factors.max(set(factors.dims) - {"motion"})

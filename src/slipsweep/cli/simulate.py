@@ -2,12 +2,11 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from slipsweep.cli import common, options
 from slipsweep.cli.common import echo
-from slipsweep.cli.options import BLOCK, OUTPUT, RARE, SHAKING, File, Text
+from slipsweep.cli.options import OUTPUT, SHAKING, File
 from slipsweep.errors import InputError, RunError
 from slipsweep.files import outputs
 from slipsweep.model import variables
@@ -19,73 +18,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-@dataclass(frozen=True)
-class Typed:
-    """The parameters of a block and its shaking; text may have a unit."""
-
-    theta: Annotated[Text, options.THETA] = None
-    mu_s: options.MuS = None
-    phi: options.Phi = None
-    yield_acceleration: Annotated[
-        Text, BLOCK("Yield acceleration: 0.1g, 0.98 (m/s²) (default: Coulomb's).", "VALUE")
-    ] = None
-    yield_coefficient: Annotated[
-        float | None, RARE("Üy/g of Newmark's block, instead of --theta and --mu-s.")
-    ] = None
-    upslope_yield_acceleration: Annotated[
-        Text,
-        RARE("Yield acceleration upslope, with --sliding both (default: by statics).", "VALUE"),
-    ] = None
-    decay_rate: Annotated[float | None, BLOCK("Friction decay λ (default: Eq. 6 at the peak).")] = (
-        None
-    )
-    delta_mu: Annotated[float | None, BLOCK("Friction above static Δμ (default: Eqs. 10, 11).")] = (
-        None
-    )
-    minimum_friction: Annotated[float | None, BLOCK("Minimum friction μmin (default: Eq. 9).")] = (
-        None
-    )
-    residual_mu: Annotated[
-        float | None, RARE("Residual friction coefficient, with --strength weakening.")
-    ] = None
-    residual_phi: Annotated[
-        Text, RARE("Residual friction angle instead: 9 (degrees).", "VALUE")
-    ] = None
-    weakening_distance: Annotated[
-        Text, RARE("Slip from peak to residual friction: 50mm, 0.05 (m).", "VALUE")
-    ] = None
-    fast_mu: Annotated[
-        float | None, RARE("Friction coefficient at high velocity, with --strength rate.")
-    ] = None
-    rate_constant: Annotated[
-        Text, RARE("How fast it is approached with the velocity, s/m.", "VALUE")
-    ] = None
-    structure_frequency: Annotated[
-        Text, RARE("Natural frequency of the structure, Hz: flag flexible_block.", "VALUE")
-    ] = None
-    amplitude: Annotated[Text, SHAKING("Peak ground acceleration: 0.36g, 3.5 (m/s²).", "VALUE")] = (
-        None
-    )
-    displacement_amplitude: Annotated[
-        Text,
-        SHAKING("Peak ground displacement instead: 30mm, 0.03 (m); not with a record.", "VALUE"),
-    ] = None
-    frequency: Annotated[Text, SHAKING("Excitation frequency, Hz; not with a record.", "VALUE")] = (
-        None
-    )
-    scale: Annotated[float | None, SHAKING("Factor on a record's acceleration (default: 1).")] = (
-        None
-    )
-    pgv: Annotated[Text, RARE("Peak ground velocity to scale a record to: 40cm/s.", "VALUE")] = None
-    arias_intensity: Annotated[
-        Text, RARE("Arias intensity to scale a record to, m/s.", "VALUE")
-    ] = None
-    time_scale: Annotated[float | None, RARE("Factor on a record's time (default: 1).")] = None
-    polarity: Annotated[
-        int | None, SHAKING("Sign of a record, 1 or -1; 1: positive drives downslope (default: 1).")
-    ] = None
-
-
 @options.command(
     "Compute",
     "slipsweep simulate --theta 5 --mu-s 0.38 --amplitude 3.55 --frequency 1.8 -o a.png -o a.csv",
@@ -93,7 +25,7 @@ class Typed:
 )
 def simulate(
     *,
-    typed: Typed,
+    typed: Annotated[Any, options.ParameterOptions],
     model: Annotated[Model, MODELS],
     excitation: Annotated[Waveform | None, WAVEFORMS] = None,
     record: Annotated[
@@ -125,20 +57,20 @@ def simulate(
         raise InputError(
             f"--waveform {excitation.name}: not allowed with --record, which is the shaking itself"
         )
-    from slipsweep.charts import solved
     from slipsweep.motion.records import read_record
+    from slipsweep.studies.cautions import slides_back_text
     from slipsweep.studies.history import simulate as simulated
 
     try:
         recorded = None if record is None else read_record(record, **reading)
     except InputError as error:  # options as they are typed: --gaps linear for gaps = 'linear'
         raise InputError(re.sub(r"\b(\w+) = '([^']*)'", r"--\1 \2", str(error))) from None
-    given: dict[str, Any] = {
+    arguments: dict[str, Any] = {
         **vars(typed),
         **with_unit,
         "excitation": recorded or excitation or WAVEFORMS.default,
     }
-    table = simulated(**given, model=model, points_per_cycle=points)
+    table = simulated(**arguments, model=model, points_per_cycle=points)
     taken_as = _taken_as(table, model.g)
     validity = variables.Validity(table["validity"].item())
     if flags := validity & variables.VALUELESS:
@@ -175,13 +107,12 @@ def simulate(
         echo(f"{'clearance':<23} {extent.item():.6g} m")
     echo(f"peak relative velocity  {table['peak_relative_velocity'].item():.6g} m/s")
     if "sliding_mode" in table:
-        echo(
-            f"sliding mode            {variables.SlidingMode(table['sliding_mode'].item()).name.lower()}"
-        )
+        mode = variables.SlidingMode(table["sliding_mode"].item())
+        echo(f"sliding mode            {mode.name.lower()}")
     counts = (name for name in variables.RECORD_COUNTS if name in table)
     echo(*(f"{name.replace('_', ' '):<24}{table[name].item()}" for name in counts))
     echo(f"inputs                  {table.attrs['friction_inputs']}")
-    if slides_back := solved.slides_back_text(table):
+    if slides_back := slides_back_text(table):
         echo(f"{'caution':<24}{slides_back}")
     for kind in variables.FlagKind:
         flags = validity & variables.flags_of(kind)
@@ -192,7 +123,7 @@ def simulate(
 
 
 def _taken_as(table: "xr.Dataset", g: float) -> str:
-    """Parameters of a time history with their units, also those that were not typed."""
+    """Return the parameters of a time history with their units, also those not typed."""
     texts = (
         f"{name if name == 'mu_s' else name.replace('_', ' ')} "
         f"{common.range_text(name, [table[name].item()], g)}"

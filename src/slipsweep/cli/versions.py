@@ -1,4 +1,4 @@
-"""`slipsweep --versions`: what a report of a fault says of the machine and of what is installed."""
+"""`slipsweep --versions`: the machine and the installed packages, for a report of a fault."""
 
 import importlib.metadata
 import os
@@ -14,7 +14,7 @@ _EXTRAS = ("parquet", "xlsx", "zarr", "cluster", "explore")
 
 
 def lines() -> Iterator[str]:
-    """Yield the versions of the program, Python, the system and the packages, and settings of numba."""
+    """Yield lines on the program, Python, the system, the packages, and settings of numba."""
     yield f"slipsweep {__version__}"
     yield f"Python {platform.python_version()} ({platform.python_implementation()})"
     yield f"{platform.platform()}, {os.cpu_count()} processors"
@@ -28,7 +28,7 @@ def lines() -> Iterator[str]:
 
 
 def _packages() -> list[str]:
-    """Names of the packages that the program and its extras use."""
+    """Return the names of the packages that the program and its extras use."""
     try:
         requirements = importlib.metadata.requires("slipsweep") or []
     except importlib.metadata.PackageNotFoundError:  # sources that are not installed
@@ -50,12 +50,12 @@ def _version_of(package: str) -> str:
 
 
 def _libraries() -> Iterator[str]:
-    """Yield the libraries that read and write files, and the processor that kernels are compiled for."""
+    """Yield lines on the libraries for files, and on the processor that kernels are made for."""
     try:
         import netCDF4
 
         yield f"netCDF library {netCDF4.__netcdf4libversion__}, HDF5 {netCDF4.__hdf5libversion__}"
-    except ImportError as error:  # which may be the fault that is reported
+    except ImportError as error:  # it may be the fault that is reported
         yield f"netCDF library: {error}"
     try:
         import llvmlite.binding

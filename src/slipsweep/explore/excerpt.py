@@ -1,4 +1,4 @@
-"""What a page shows of a result: an evenly spaced part of it, small enough for a page."""
+"""Part of a result that a page shows: evenly spaced values of its axes, few enough for a page."""
 
 import math
 from collections.abc import Collection, Mapping, Sequence
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from slipsweep.charts.sheet import is_log
 from slipsweep.charts.slices import Result
-from slipsweep.charts.solved import with_amplitude
 from slipsweep.errors import InputError
 from slipsweep.files.opening import open_result
 from slipsweep.files.selection import axis_labels, axis_numbers
@@ -26,10 +25,11 @@ from slipsweep.model.variables import (
     UNFLAGGED_TEXT,
     has_signed_displacements,
 )
+from slipsweep.studies.solved_again import with_amplitude
 from slipsweep.studies.suite_statistics import suite_statistics
 
-#: What can be chosen for the map, in the order in which it is offered, and in words that fit on a
-#: phone.
+#: Results that can colour the map, in the order in which they are offered, and in words that fit on
+#: a phone.
 LAYERS = {
     "permanent_displacement": "displacement",
     "newmark_displacement": "Newmark's displacement",
@@ -39,60 +39,65 @@ LAYERS = {
     "exceedance_probability": "probability of exceeding",
 }
 
-#: What a page shows of a cell, and its type in the page.
-SHOWN = dict.fromkeys((*LAYERS, "valueless_share"), "<f4") | {
+#: Results that a page shows, and the type of their numbers in the page.
+RESULT_TYPES = dict.fromkeys((*LAYERS, "valueless_share"), "<f4") | {
     "sliding_mode": "<i1",
     "validity": "<i2",
 }
 
-#: Dimensions of which statistics are made, or which are statistics themselves: none of their values
-#: is left out.
-_WHOLE = ("polarity", "motion", "quantile", "threshold")
+#: Dimensions of which statistics are made, or along which they lie: all their values are kept.
+_UNTHINNED = ("polarity", "motion", "quantile", "threshold")
 
 #: Largest magnitude of a coordinate: products of a few of them are still numbers.
-_MOST = 1e75
+_LARGEST_COORDINATE = 1e75
 
-_VERTICAL = ("amplitude", "displacement_amplitude", *STRENGTHS[1:])
+#: Strengths of the shaking, of which the first that is an axis goes up the map.
+_UP_THE_MAP = ("amplitude", "displacement_amplitude", *STRENGTHS[1:])
+
+#: Values along an axis of the map that count as one of another axis: it needs more than a slider.
+_MAP_WEIGHT = 4
 
 
 def thinned_lengths(
     lengths: Mapping[str, int],
     cells: int,
     map_dims: Sequence[str] = (),
-    whole: Collection[str] = (),
+    unthinned: Collection[str] = (),
 ) -> dict[str, int]:
-    """Lengths of the axes of a grid cut down to a number of cells, the longest cut first.
+    """Cut the axes of a grid down to a number of cells, the longest first; return their lengths.
 
-    Four values of a dimension of the map count as one of another, since a map needs more of them
-    than a slider; it keeps two values.  Dimensions in `whole` are not cut.
+    Four values of a dimension of the map count as one of another.  It keeps two values, others keep
+    one, and those in `unthinned` all.
     """
-    left = dict(lengths)
-    least = {
-        dim: n if dim in whole else min(n, 2) if dim in map_dims else 1
-        for dim, n in lengths.items()
-    }
-    while math.prod(left.values()) > cells:
-        spare = {
-            dim: n / (4 if dim in map_dims else 1) for dim, n in left.items() if n > least[dim]
+    thinned = dict(lengths)
+    least = {}
+    for dim, length in lengths.items():
+        least[dim] = length if dim in unthinned else min(length, 2 if dim in map_dims else 1)
+    while math.prod(thinned.values()) > cells:
+        weighted = {
+            dim: length / (_MAP_WEIGHT if dim in map_dims else 1)
+            for dim, length in thinned.items()
+            if length > least[dim]
         }
-        if not spare:
+        if not weighted:
             break
-        longest = max(spare, key=lambda dim: spare[dim])
+        longest = max(weighted, key=lambda dim: weighted[dim])
         # a twentieth at a time: axes shrink together, and long ones in few steps
-        left[longest] = max(least[longest], left[longest] - max(1, left[longest] // 20))
-    return left
+        step = max(1, thinned[longest] // 20)
+        thinned[longest] = max(least[longest], thinned[longest] - step)
+    return thinned
 
 
-def evenly(length: int, kept: int) -> NDArray[np.intp]:
-    """Return `kept` indices of `length`, first and last among them, as evenly as whole numbers allow."""
-    return np.unique(np.linspace(0, length - 1, kept).round().astype(np.intp))
+def evenly_spaced(length: int, count: int) -> NDArray[np.intp]:
+    """Return `count` of the indices below `length`, as evenly as possible, with first and last."""
+    return np.unique(np.linspace(0, length - 1, count).round().astype(np.intp))
 
 
 @dataclass(frozen=True)
 class Excerpt:
-    """What a page shows of a result.
+    """Part of a result that a page shows.
 
-    `table` has the coordinates, which increase along each dimension, and the results in `SHOWN`;
+    `table` has the coordinates, which increase along each dimension, and results of `RESULT_TYPES`;
     `map_dims` are the dimensions up and across the map; `lengths` are those of the file, `sizes`
     those of the page; `labels` are names along dimensions that have no numbers: cases and motions.
     """
@@ -105,11 +110,11 @@ class Excerpt:
 
     @property
     def layers(self) -> list[str]:
-        """The results that the map can show."""
+        """Results that the map can show."""
         return [name for name in LAYERS if name in self.table]
 
     def is_log(self, dim: str) -> bool:
-        """Return True if an axis is drawn by factors: the frequency, and others that are spread so."""
+        """Return True for a frequency, and for axes whose values have constant ratios."""
         values = axis_numbers(self.table, dim)
         return (dim == "frequency" and values.size > 1) or is_log(values)
 
@@ -121,60 +126,76 @@ def read_excerpt(path: Path, cells: int) -> Excerpt:
     """
     result = Result(open_result(path), path).data  # checked, in increasing order
     result = result.sortby([dim for dim in ("polarity",) if dim in result.dims])
-    names = [name for name in SHOWN if name in result.data_vars]
+    names = [name for name in RESULT_TYPES if name in result.data_vars]
     layers = [name for name in names if name in LAYERS]
     if not layers:
         raise InputError(
-            f"{path}: holds no permanent_displacement to draw; add it to output.variables and run the sweep again"
+            f"{path}: holds no permanent_displacement to draw; "
+            "add it to output.variables and run the sweep again"
         )
     lengths = {str(dim): size for name in layers for dim, size in result[name].sizes.items()}
     map_dims = _map_dims(path, lengths)
-    left = thinned_lengths(lengths, cells, map_dims, _WHOLE)
-    if math.prod(left.values()) > cells:
+    sizes = thinned_lengths(lengths, cells, map_dims, _UNTHINNED)
+    if math.prod(sizes.values()) > cells:
         raise InputError(
             f"{path}: a grid of {len(lengths)} dimensions does not fit into a page of this size"
         )
-    keep = {dim: evenly(length, left[dim]) for dim, length in lengths.items()}
-    table = with_amplitude(
-        result[names].isel(keep).transpose(*lengths, ...).load(scheduler="single-threaded")
-    )
-    for name in names:
-        beyond = [dim for dim in table[name].dims if dim not in lengths]
-        if beyond:
-            raise InputError(
-                f"{path}: {name}: lies along {beyond[0]}, along which no displacement does"
-            )
-        if name == "validity" and table[name].isnull().any():
-            raise InputError(f"{path}: validity: {UNFLAGGED_TEXT}")
-        described = dict((STATISTICS | RESULTS)[name])
-        if name in SIGNED and has_signed_displacements(result.attrs):
-            described["long_name"] += "; colours show its magnitude"
-        table[name] = table[name].astype(SHOWN[name]).assign_attrs(described)
-    labels = {dim: axis_labels(table, dim) for dim in lengths if dim not in PARAMETERS}
-    table = xr.Dataset(
-        {name: table[name].variable for name in names}, _coordinates(path, table), result.attrs
-    )
-    if "motion" in left and {"permanent_displacement", "validity"} <= {*names}:
+    indices = {dim: evenly_spaced(length, sizes[dim]) for dim, length in lengths.items()}
+    part = result[names].isel(indices).transpose(*lengths, ...).load(scheduler="single-threaded")
+    part = with_amplitude(part)
+    _check_results(path, part, names, lengths)
+    table = _table(path, part, names)
+    if "motion" in sizes and {"permanent_displacement", "validity"} <= {*names}:
         table = _with_statistics(table)
-        left |= {dim: table.sizes[dim] for dim in ("quantile", "threshold")}
-    return Excerpt(
-        table, map_dims, lengths, left, {dim: texts for dim, texts in labels.items() if texts}
-    )
+        sizes |= {dim: table.sizes[dim] for dim in ("quantile", "threshold")}
+    labels = {dim: axis_labels(part, dim) for dim in lengths if dim not in PARAMETERS}
+    labels = {dim: texts for dim, texts in labels.items() if texts}
+    return Excerpt(table, map_dims, lengths, sizes, labels)
+
+
+def _check_results(
+    path: Path, part: xr.Dataset, names: Sequence[str], dims: Collection[str]
+) -> None:
+    """Raise InputError if a result lies along other dimensions, or cells have no flags."""
+    for name in names:
+        others = [dim for dim in part[name].dims if dim not in dims]
+        if others:
+            raise InputError(
+                f"{path}: {name}: lies along {others[0]}, along which no displacement does"
+            )
+    if "validity" in names and part["validity"].isnull().any():
+        raise InputError(f"{path}: validity: {UNFLAGGED_TEXT}")
+
+
+def _table(path: Path, part: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
+    """Results with the types and long names of the page, and the parameters."""
+    results = {}
+    for name in names:
+        attrs = dict((STATISTICS | RESULTS)[name])
+        if name in SIGNED and has_signed_displacements(part.attrs):
+            attrs["long_name"] += "; colours show its magnitude"
+        results[name] = part[name].astype(RESULT_TYPES[name]).assign_attrs(attrs).variable
+    return xr.Dataset(results, _coordinates(path, part), part.attrs)
 
 
 def _with_statistics(table: xr.Dataset) -> xr.Dataset:
     """Add the statistics over the motions of a suite."""
-    found = suite_statistics(table)
-    table = table.assign_coords({dim: found[dim].variable for dim in ("quantile", "threshold")})
-    for name in [one for one in SHOWN if one in found.data_vars]:
-        text = str(found[name].attrs["long_name"])
-        text = text if "motions" in text else f"{text}, over all motions"
-        table[name] = found[name].astype(SHOWN[name]).assign_attrs(long_name=text).variable
+    statistics = suite_statistics(table)
+    dims = {dim: statistics[dim].variable for dim in ("quantile", "threshold")}
+    table = table.assign_coords(dims)
+    for name, number_type in RESULT_TYPES.items():
+        if name not in statistics.data_vars:
+            continue
+        long_name = str(statistics[name].attrs["long_name"])
+        if "motions" not in long_name:
+            long_name += ", over all motions"
+        values = statistics[name].astype(number_type)
+        table[name] = values.assign_attrs(long_name=long_name).variable
     return table
 
 
 def _map_dims(path: Path, lengths: Mapping[str, int]) -> tuple[str, str]:
-    """The dimensions up and across the map: the strength of the shaking over its frequency, or what there is."""
+    """Dimensions up and across the map: strength over frequency, or else the longest ones."""
     axes = [
         dim
         for dim, length in lengths.items()
@@ -183,24 +204,24 @@ def _map_dims(path: Path, lengths: Mapping[str, int]) -> tuple[str, str]:
     axes.sort(key=lambda dim: -lengths[dim])
     axes += [dim for dim in ("motion",) if lengths.get(dim, 1) > 1]
     if len(axes) < 2:
-        held = ", ".join(f"{dim} ({length})" for dim, length in lengths.items()) or "none"
+        dims = ", ".join(f"{dim} ({length})" for dim, length in lengths.items()) or "none"
         raise InputError(
-            f"{path}: no map to draw: explore needs two parameters as axes with two values or more; "
-            f"the dimensions are: {held}"
+            f"{path}: no map to draw: explore needs two parameters as axes with two values or "
+            f"more; the dimensions are: {dims}"
         )
-    up = next(dim for dim in (*_VERTICAL, *axes) if dim in axes and dim != "frequency")
+    up = next(dim for dim in (*_UP_THE_MAP, *axes) if dim in axes and dim != "frequency")
     across = next(dim for dim in ("frequency", *axes) if dim in axes and dim != up)
     return up, across
 
 
-def _coordinates(path: Path, table: xr.Dataset) -> dict[str, Any]:
-    """The parameters along the dimensions of a page."""
-    coords: dict[str, Any] = {
-        name: (table[name].dims, table[name].values.astype(np.float64), about)
-        for name, about in (PARAMETERS | STATISTIC_COORDINATES).items()
-        if name in table.coords and table[name].dtype.kind in "iuf"
-    }
-    for name, (_, values, _) in coords.items():
-        if not (np.abs(values) < _MOST).all():
+def _coordinates(path: Path, part: xr.Dataset) -> dict[str, Any]:
+    """Parameters along the dimensions of a page.  InputError: they are no numbers to draw."""
+    coords: dict[str, Any] = {}
+    for name, attrs in (PARAMETERS | STATISTIC_COORDINATES).items():
+        if name not in part.coords or part[name].dtype.kind not in "iuf":
+            continue
+        values = part[name].values.astype(np.float64)
+        if not (np.abs(values) < _LARGEST_COORDINATE).all():
             raise InputError(f"{path}: {name}: values are missing, or too large to draw")
+        coords[name] = (part[name].dims, values, attrs)
     return coords

@@ -1,4 +1,4 @@
-"""Results as tables in files, by pandas: CSV, Parquet or a spreadsheet, in pieces of `CHUNK_CELLS`."""
+"""Results as tables in files, by pandas: CSV, Parquet or a spreadsheet."""
 
 import io
 import math
@@ -19,7 +19,6 @@ from slipsweep.files.opening import read_result, result_names, values_text
 from slipsweep.files.outputs import check_endings, check_outputs, complete_or_absent
 from slipsweep.files.selection import axis_values, places_at
 from slipsweep.grid.chunks import grid_chunks
-from slipsweep.grid.tally import tally_of
 from slipsweep.model.variables import (
     LIMIT_RESULTS,
     MOTION_FILES,
@@ -28,11 +27,12 @@ from slipsweep.model.variables import (
     UNFLAGGED_TEXT,
 )
 from slipsweep.studies.published_statistics import published_table
+from slipsweep.studies.result_counts import tally_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Cells read at a time; text of ten columns takes a hundred times as many bytes.
+#: Cells read at a time; as text, ten columns take a hundred bytes a cell.
 CHUNK_CELLS = 2**18
 
 #: Endings of tables, the package that writes each, and the extra that brings it.
@@ -42,7 +42,7 @@ SUFFIXES = {
     ".xlsx": ("xlsxwriter", "xlsx"),
 }
 
-#: What a sheet of a spreadsheet can hold, the header included.
+#: Most rows, the header included, and most columns of a sheet of a spreadsheet.
 MOST_ROWS = 1_048_576
 MOST_COLUMNS = 16_384
 
@@ -65,17 +65,19 @@ def export(
     overwrite: bool = False,
     progress: Callable[[int], AbstractContextManager[Callable[[int], None] | None]] | None = None,
 ) -> int:
-    """Write a result of slipsweep as a table, complete or not at all; return the number of rows, of all sheets.
+    """Write a result of slipsweep as a table; return the number of rows, of all sheets.
 
-    The ending of `path` is one of `SUFFIXES`.  Results are `variables`, by default all; dimensions
-    that none of them has are left out.  Sliding modes and flags are codes or `words`, accelerations
-    in m/s² or `in_g`, that of the model. `at` says which values to keep of an axis, as
-    `slipsweep.files.selection.places_at`.  With `columns`, the axis along the columns of a pivoted
-    table, `rows` are those along its rows.  With `equations` a spreadsheet has a sheet of that
-    name: `published_table`.  `progress` is given how many rows there are, and yields
-    what to call with a number of rows just written.  InputError: `source` is not slipsweep's,
-    `path` cannot be written, a variable, axis or value is not in the file, a spreadsheet cannot
-    hold the table, or the package is missing that writes it.
+    The file is complete, or not there.  The ending of `path` is one of `SUFFIXES`.  Results are
+    `variables`, by default all; dimensions that none of them has are left out.  Sliding modes and
+    flags are codes or `words`, accelerations in m/s² or `in_g`, the g of the model.  `at` selects
+    values of axes, as `slipsweep.files.selection.places_at`.  With `columns`, the axis along the
+    columns of a pivoted table, `rows` are the axes along its rows.  With `equations` a spreadsheet
+    has a sheet of that name: `published_table`.  `progress` is called with the number of rows, and
+    yields a function that is called with a number of rows just written.
+
+    InputError: `source` was not written by slipsweep, `path` cannot be written, a variable, axis or
+    value is not in the file, a spreadsheet cannot hold the table, or the package that writes it is
+    missing.
     """
     _check_format(path)
     if equations and path.suffix != ".xlsx":
@@ -87,16 +89,18 @@ def export(
         for name in chosen:
             if name not in whole.data_vars:
                 raise InputError(
-                    f'{source}: no variable "{name}"; {did_you_mean(name, [*map(str, whole.data_vars)])}'
+                    f'{source}: no variable "{name}"; '
+                    f"{did_you_mean(name, [*map(str, whole.data_vars)])}"
                 )
         part = whole[chosen]
-        widest = max((one.dims for one in part.data_vars.values()), key=len)
+        widest = max((result.dims for result in part.data_vars.values()), key=len)
         dims = list(dict.fromkeys(map(str, (*widest, *part.sizes))))
         part = part.isel(places_at(whole, source, at or {}, dims))
         if columns is None:
             if rows:
                 raise InputError(
-                    f"--rows {','.join(rows)}: needs --columns, the axis whose values become columns"
+                    f"--rows {','.join(rows)}: needs --columns, the axis whose values become "
+                    "columns"
                 )
             tables = [Table(part, Path(str(source)).stem, words, dims)]
         else:
@@ -104,13 +108,16 @@ def export(
             flat = {dim: 0 for dim in dims if dim not in (*along, columns)}
             tables = []
             for name in chosen:
-                one = part[[name]].isel(flat, missing_dims="ignore")
-                if columns not in one.sizes:
+                result = part[[name]].isel(flat, missing_dims="ignore")
+                if columns not in result.sizes:
                     raise InputError(
-                        f"{source}: --columns {columns}: not an axis of {name}; choose others with --variable"
+                        f"{source}: --columns {columns}: not an axis of {name}; choose others with "
+                        "--variable"
                     )
                 tables.append(
-                    Table(one, name, words, [dim for dim in along if dim in one.sizes], columns)
+                    Table(
+                        result, name, words, [dim for dim in along if dim in result.sizes], columns
+                    )
                 )
         if path.suffix == ".xlsx":
             for table in tables:
@@ -118,7 +125,8 @@ def export(
         elif len(tables) > 1:
             raise InputError(
                 f"{path}: a table with --columns has one result; choose it with --variable "
-                f"({', '.join(table.name for table in tables)}), or write .xlsx, which has a sheet for each"
+                f"({', '.join(table.name for table in tables)}), or write .xlsx, which has a sheet "
+                "for each"
             )
         beside = None
         if equations:
@@ -139,7 +147,7 @@ def export(
 
 
 def _check_format(path: Path) -> None:
-    """Refuse a name that ends in no table's ending, or whose package is missing (InputError)."""
+    """Raise InputError if the ending is not that of a table, or its package is missing."""
     check_endings([path], SUFFIXES)
     package, extra = SUFFIXES[path.suffix]
     what = f"{path}: a table in {path.suffix}"
@@ -147,16 +155,16 @@ def _check_format(path: Path) -> None:
 
 
 def _in_g(table: xr.Dataset) -> xr.Dataset:
-    """The same with accelerations in g."""
-    found = table.copy()
-    for name, one in table.variables.items():
-        if one.attrs.get("units") == "m s-2":
-            found[name] = (
-                one.dims,
-                one.values / float(table.attrs["g"]),
-                {**one.attrs, "units": "g"},
+    """Return the table with accelerations in g."""
+    converted = table.copy()
+    for name, variable in table.variables.items():
+        if variable.attrs.get("units") == "m s-2":
+            converted[name] = (
+                variable.dims,
+                variable.values / float(table.attrs["g"]),
+                {**variable.attrs, "units": "g"},
             )
-    return found
+    return converted
 
 
 # ------------------------------------------------------------------------------- the tables
@@ -166,7 +174,7 @@ def _in_g(table: xr.Dataset) -> xr.Dataset:
 class Table:
     """A table: results with one row a cell, or one result pivoted."""
 
-    part: xr.Dataset  # the results, cut to what is exported; of a pivoted table one
+    part: xr.Dataset  # the exported part of the results; one result in a pivoted table
     name: str
     words: bool  # instead of codes
     rows: list[str]  # dimensions along the rows
@@ -179,29 +187,30 @@ class Table:
 
     @cached_property
     def left(self) -> list[str]:
-        """Coordinates along the rows; of a long table also those of one value."""
+        """Coordinates along the rows; a table that is not pivoted also has those of one value."""
         coords = self.part.drop_vars(MOTION_FILES, errors="ignore").coords
         names = [name for name in dict.fromkeys((*PARAMETERS, *map(str, coords))) if name in coords]
         return [
-            one
-            for one in names
-            if {*coords[one].dims} <= {*self.rows} and (coords[one].dims or not self.columns)
+            name
+            for name in names
+            if {*coords[name].dims} <= {*self.rows} and (coords[name].dims or not self.columns)
         ]
 
     def check_size(self, source: object) -> None:
-        """Refuse what a sheet cannot hold, and say what to cut."""
+        """Raise InputError if a sheet of a spreadsheet cannot hold the table."""
         width = len(self.left) + (
             self.part.sizes[self.columns] if self.columns else len(self.part.data_vars)
         )
         if width > MOST_COLUMNS or self.count >= MOST_ROWS:
             sizes = " x ".join(f"{self.part.sizes[dim]} {dim}" for dim in self.rows)
             raise InputError(
-                f"{source}: the table has {self.count} rows ({sizes}) and {width} columns, a sheet of .xlsx "
-                f"{MOST_ROWS} with its header and {MOST_COLUMNS}; take fewer values with --at, or write .csv"
+                f"{source}: the table has {self.count} rows ({sizes}) and {width} columns, a sheet "
+                f"of .xlsx {MOST_ROWS} with its header and {MOST_COLUMNS}; take fewer values with "
+                "--at, or write .csv"
             )
 
     def frames(self, cells: int) -> "Iterator[pd.DataFrame]":
-        """The table in pieces of so many cells."""
+        """Yield the table in pieces of so many cells."""
         import pandas as pd
 
         across = self.part.sizes[self.columns] if self.columns else 1
@@ -210,48 +219,52 @@ class Table:
         ):
             part = self.part.isel(chunk).load()
             shape = {dim: part.sizes[dim] for dim in self.rows}
-            found = {
+            columns = {
                 header(part[name]): part[name].variable.set_dims(shape).values.ravel()
                 for name in self.left
             }
-            shown: dict[Any, xr.DataArray] = {header(one): one for one in part.data_vars.values()}
+            shown: dict[Any, xr.DataArray] = {
+                header(result): result for result in part.data_vars.values()
+            }
             if self.columns is not None:
-                ((result, one),) = shown.items()
+                ((title, result),) = shown.items()
                 last = header(part[self.left[-1]]) if self.left else ""
-                corner = f"{last} \\ {self._across(self.columns, result)}"
-                found[corner] = found.pop(last, np.arange(1, 1 + math.prod(shape.values())))
+                corner = f"{last} \\ {self._across(self.columns, title)}"
+                columns[corner] = columns.pop(last, np.arange(1, 1 + math.prod(shape.values())))
                 values = axis_values(part, self.columns)
                 shown = {
-                    value: one.isel({self.columns: place}) for place, value in enumerate(values)
+                    value: result.isel({self.columns: place}) for place, value in enumerate(values)
                 }
-            for title, one in shown.items():
-                found[title] = self._column(one, one.variable.set_dims(shape).values.ravel())
-            yield pd.DataFrame(found)
+            for title, result in shown.items():
+                columns[title] = self._column(
+                    result, result.variable.set_dims(shape).values.ravel()
+                )
+            yield pd.DataFrame(columns)
 
     def _across(self, columns: str, result: str) -> str:
-        """What the columns of a pivoted table are, what it is of, and what it has one value of."""
+        """Return the heading of a pivoted table: its columns, its result, and single values."""
         coords = self.part.coords
         single = [
             name
-            for name, one in coords.items()
-            if one.size == 1 and name not in (*self.rows, columns)
+            for name, coordinate in coords.items()
+            if coordinate.size == 1 and name not in (*self.rows, columns)
         ]
         at = ", ".join(f"{name} = {values_text(coords[name])}" for name in single)
         across = header(coords[columns]) if columns in coords else columns
         return f"{across}: {result}" + (f" at {at}" if at else "")
 
-    def _column(self, one: xr.DataArray, values: Any) -> Any:
-        """Values of a result as a table has them: codes that stand for no value missing, or in words."""
+    def _column(self, result: xr.DataArray, values: Any) -> Any:
+        """Return the values of a result as a table has them: missing codes empty, or words."""
         import pandas as pd
 
-        if one.name == "validity" and values.dtype.kind == "f":  # some have lost their flags
+        if result.name == "validity" and values.dtype.kind == "f":  # some have lost their flags
             missing = np.isnan(values)
             values = np.where(missing, 0, values).astype(np.int16)
         elif values.dtype.kind not in "iu":
             return values
         else:
-            missing = (values == -1) & (one.name in WITH_MISSING)
-        about = (LIMIT_RESULTS | RESULTS).get(str(one.name), {}) | one.attrs
+            missing = (values == -1) & (result.name in WITH_MISSING)
+        about = (LIMIT_RESULTS | RESULTS).get(str(result.name), {}) | result.attrs
         if self.words and "flag_meanings" in about:
             return (
                 pd.Series(values, dtype=object)
@@ -265,17 +278,21 @@ class Table:
         )
 
 
-def header(one: xr.DataArray) -> str:
-    """Heading of a column: a name and its unit."""
-    return f"{one.name} ({one.attrs['units']})" if "units" in one.attrs else str(one.name)
+def header(variable: xr.DataArray) -> str:
+    """Return the heading of a column: a name and its unit."""
+    return (
+        f"{variable.name} ({variable.attrs['units']})"
+        if "units" in variable.attrs
+        else str(variable.name)
+    )
 
 
 def _spelled(about: Mapping[str, Any], codes: Any) -> dict[Any, str]:
-    """Codes in the words of a variable's attributes; flags one after the other."""
-    known = (
+    """Return the words of codes, from the attributes of a variable; several flags are joined."""
+    flag_codes = (
         np.atleast_1d(about.get("flag_masks", about.get("flag_values", ()))).astype(int).tolist()
     )
-    words = list(zip(known, str(about["flag_meanings"]).split(), strict=False))
+    words = list(zip(flag_codes, str(about["flag_meanings"]).split(), strict=False))
     if "flag_masks" in about:
         return {code: " ".join(word for mask, word in words if code & mask) for code in codes}
     return {code: dict(words).get(int(code), str(code)) for code in codes}
@@ -284,7 +301,7 @@ def _spelled(about: Mapping[str, Any], codes: Any) -> dict[Any, str]:
 def _pivot_rows(
     part: xr.Dataset, source: object, dims: Sequence[str], rows: Sequence[str], columns: str
 ) -> list[str]:
-    """The dimensions along the rows of a pivoted table (InputError: the axes are not those of such a table)."""
+    """Return the dimensions along the rows of a pivoted table (InputError: they do not fit)."""
     for option, name in (*(("--rows", name) for name in rows), ("--columns", columns)):
         if name not in dims:
             raise InputError(
@@ -295,7 +312,8 @@ def _pivot_rows(
     wide = [dim for dim in dims if dim not in (*rows, columns) and part.sizes[dim] > 1]
     if not rows and not wide:
         raise InputError(
-            f"{source}: --columns {columns}: no other axis has more than one value, none is left for rows"
+            f"{source}: --columns {columns}: no other axis has more than one value, none is left "
+            "for rows"
         )
     if rows and wide:
         texts = ", ".join(f"{dim} ({part.sizes[dim]} values)" for dim in wide)
@@ -360,7 +378,7 @@ def _write_workbook(
 ) -> None:
     import pandas as pd
 
-    # to memory: where a disk is full, zipfile of Python 3.13 would print a traceback besides the
+    # written to memory: on a full disk zipfile of Python 3.13 would print a traceback beside the
     # error
     options = {
         "strings_to_formulas": False,
@@ -373,9 +391,8 @@ def _write_workbook(
         for table in tables:
             start = 0
             for frame in table.frames(CHUNK_CELLS):
-                for name in frame.select_dtypes(
-                    "float32"
-                ):  # its shortest digits, not 0.10000000149
+                # the shortest digits of single precision, not 0.10000000149
+                for name in frame.select_dtypes("float32"):
                     frame[name] = frame[name].astype(str).astype(float)
                 frame.to_excel(
                     book, sheet_name=table.name[:31], startrow=start, header=start == 0, index=False
@@ -393,14 +410,14 @@ def _write_workbook(
 
 
 def _about(tables: list[Table], source: object) -> list[tuple[str, str]]:
-    """Names and texts of what a table is of: results, inputs, flags, and the attributes of the result."""
+    """Return names and texts on a table: its results, inputs and flags, and all attributes."""
     part = tables[0].part
-    results = [one for table in tables for one in table.part.data_vars.values()]
+    results = [result for table in tables for result in table.part.data_vars.values()]
     rows = [("file", str(source)), ("table written by", f"slipsweep {__version__}")]
-    rows += [(header(one), str(one.attrs.get("long_name", ""))) for one in results]
+    rows += [(header(variable), str(variable.attrs.get("long_name", ""))) for variable in results]
     rows += [
-        (str(one.attrs.get("long_name", name)), values_text(one))
-        for name, one in part.coords.items()
+        (str(variable.attrs.get("long_name", name)), values_text(variable))
+        for name, variable in part.coords.items()
     ]
     for table in tables:
         if "validity" in table.part:

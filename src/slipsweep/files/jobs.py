@@ -1,9 +1,9 @@
-"""What a run carries out and writes: a plan, and what its file says beside the results."""
+"""Jobs of the commands: a plan to carry out, and what the file holds beside the results."""
 
 import hashlib
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -15,24 +15,24 @@ from slipsweep.errors import InputError
 from slipsweep.files.motions import digest_of
 from slipsweep.files.netcdf import described
 from slipsweep.files.spec import SweepSpec, named
+from slipsweep.grid.inputs import Inputs
 from slipsweep.grid.plans import Plan
 from slipsweep.model.options import slides_both_ways
 from slipsweep.model.variables import RESULT_DTYPES, STRENGTHS
 
-#: Attribute by which a run knows whether a file is its own.
+#: Attribute that identifies the run which made a file.
 RUN = "slipsweep_run"
 
 
 @dataclass(frozen=True)
 class Job:
-    """A sweep file, the plan that a command makes of it, and what the command's output says of itself."""
+    """A sweep file, the plan that a command makes from it, and the attributes of its output."""
 
     spec: SweepSpec
     plan: Plan
     title: str
-    options: Mapping[
-        str, Any
-    ]  # what the results depend on further to the sweep file, by what users know it by
+    #: Settings beside the sweep file that the results depend on, by the names that users know.
+    options: Mapping[str, Any]
     floats: str = "float64"  # data type of floating-point results in the file
     attrs: Mapping[str, str] = field(default_factory=dict)  # further attributes of the file
 
@@ -49,57 +49,64 @@ class Job:
     @cached_property
     def identity(self) -> dict[str, Any]:
         """Settings that must agree for a run to be resumed."""
-        found = {
+        settings = {
             "version of slipsweep": __version__,
             "data type": self.floats,
             "sweep file": self.spec.text,
         }
         if self.spec.recorded is not None:
-            found["recorded motion"] = digest_of(self.spec.recorded)
-        return {**found, **self.options}
+            settings["recorded motion"] = digest_of(self.spec.recorded)
+        return {**settings, **self.options}
 
     @cached_property
     def digest(self) -> str:
-        """The identity in short."""
+        """Digest of the identity."""
         return hashlib.sha256(json.dumps(self.identity, sort_keys=True).encode()).hexdigest()
 
     def described(self, table: xr.Dataset, command: str) -> xr.Dataset:
-        """Results with all that the file says, in the file's types."""
-        found = table.assign(
+        """Return results in the types of the file, with its labels and attributes."""
+        table_in_file = table.assign(
             {name: table[name].astype(dtype, copy=False) for name, dtype in self.dtypes.items()}
         )
         if self.labels:
             labels = xr.Variable(
                 "case", np.array(self.labels, object), {"long_name": "name of the case"}
             )
-            found = found.assign_coords(label=labels)
-        found = described(found, title=self.title, command=command, recorded=self.spec.recorded)
-        return found.assign_attrs(self.attrs, **{RUN: self.digest})
+            table_in_file = table_in_file.assign_coords(label=labels)
+        table_in_file = described(
+            table_in_file, title=self.title, command=command, recorded=self.spec.recorded
+        )
+        return table_in_file.assign_attrs(self.attrs, **{RUN: self.digest})
 
     def outline(self, command: str) -> xr.Dataset:
-        """As `described`, but with lazy arrays where the results will stand."""
-        import dask.array as da  # takes as long as xarray: only for runs in chunks
+        """Return the table of `described` with lazy arrays in place of the results."""
+        import dask.array as da  # slow to import: only for runs in chunks
 
         template = self.plan.template()
         zeros = {
-            name: da.zeros(one.shape, dtype=one.dtype, chunks=-1)
-            for name, one in template.data_vars.items()
+            name: da.zeros(result.shape, dtype=result.dtype, chunks=-1)
+            for name, result in template.data_vars.items()
         }
         return self.described(template.copy(data=zeros), command)
 
 
 def sweep_job(spec: SweepSpec) -> Job:
-    """The job of `slipsweep run`: a sweep, or the statistics of samples."""
+    """Return the job of `slipsweep run`: a sweep, or the statistics of samples."""
     options = {"solver": repr(spec.solver)}
     return Job(
         spec, spec.plan(), spec.output.title, options, spec.output.dtype, {"sweep": spec.text}
     )
 
 
+def _without(inputs: Inputs, names: Collection[str]) -> Inputs:
+    """Return the inputs without some of them."""
+    return {name: values for name, values in inputs.items() if name not in names}
+
+
 def limit_job(
     spec: SweepSpec, displacement: float | list[float], maximum_amplitude: float | None = None
 ) -> Job:
-    """The job of `slipsweep limit`: amplitudes (m/s²) that displacements (m, increasing) allow, over all other axes."""
+    """Return the job of `slipsweep limit`: amplitudes (m/s²) that displacements (m) allow."""
     from slipsweep.studies.limits import plan_limits  # imports numba
 
     with named(spec.source):
@@ -109,7 +116,7 @@ def limit_job(
             )
         plan = plan_limits(
             displacement,
-            replace(spec.inputs, **dict.fromkeys(("displacement_amplitude", *STRENGTHS))),
+            _without(spec.inputs, ("displacement_amplitude", *STRENGTHS)),
             excitation=spec.excitation,
             model=spec.model,
             maximum_amplitude=maximum_amplitude,
@@ -120,23 +127,21 @@ def limit_job(
 
 def strength_job(spec: SweepSpec, displacement: float | list[float], of: str) -> Job:
     """Return the job of `slipsweep limit --of`: strengths that displacements (m) require."""
-    from slipsweep.studies import strength  # imports numba
+    from slipsweep.studies import required_strength  # imports numba
 
-    # the strength is solved for; without θ the yield coefficient needs no interface
-    replaced = dict.fromkeys(("mu_s", "phi", "yield_acceleration", "yield_coefficient"))
-    both_ways = slides_both_ways(spec.model)
-    if of == "yield_coefficient" and not both_ways:
-        replaced |= dict.fromkeys(("theta",))
-    replaced |= dict.fromkeys(("structure_frequency", "decay_rate", "delta_mu"))
-    replaced |= dict.fromkeys(("minimum_friction",))
+    # the strength is solved for, and the parameters of the paper's friction law play no part
+    dropped = ["mu_s", "phi", "yield_acceleration", "yield_coefficient"]
+    dropped += ["decay_rate", "delta_mu", "minimum_friction", "structure_frequency"]
+    if of == "yield_coefficient" and not slides_both_ways(spec.model):
+        dropped.append("theta")  # a yield coefficient needs no interface
     with named(spec.source):
-        plan = strength.plan_strength(
+        plan = required_strength.plan_strength(
             displacement,
-            replace(spec.inputs, **replaced),
+            _without(spec.inputs, dropped),
             of=of,
             excitation=spec.excitation,
             model=spec.model,
             sampling=spec.sampling,
         )
     options = {"--displacement": displacement, "--of": of}
-    return Job(spec, plan, strength.TITLE, options)
+    return Job(spec, plan, required_strength.TITLE, options)

@@ -1,8 +1,8 @@
-"""Recorded motions in files of results: written with them, and read back to repeat a run when their files are gone.
+"""Recorded motions in files of results, from which a run is repeated when their own files are gone.
 
-A record lies along a dimension of its own, its samples; of a suite the samples of one record follow
-those of the other, and what is said of each, the number of its samples among that, lies along a
-second dimension.
+The samples of a record lie along a dimension of their own.  In a suite the samples of one record
+follow those of the one before.  The label of each record, the number of its samples and its other
+attributes lie along a second dimension.
 """
 
 import hashlib
@@ -22,7 +22,7 @@ from slipsweep.motion.suites import Pair, Suite
 RECORD_DIM = "record_sample"
 SUITE_DIM = "record"
 
-#: What is written of each record of a suite, beside how it was read.
+#: Variables for each record of a suite, beside those that say how it was read.
 _LABEL = "record_label"
 _COUNT = "record_count"
 _COMPONENT = "record_component"
@@ -50,7 +50,7 @@ _ABOUT: dict[str, dict[str, Any]] = {
     "record_baseline": {"long_name": "what was taken off a record"},
 }
 
-#: The attribute of a record that each variable holds: of the same name but for two.
+#: Attribute of a record that each variable holds; two names differ.
 _ATTRIBUTES = {name: name for name in _ABOUT} | {
     "record_file": "record",
     "record_baseline": "baseline",
@@ -58,46 +58,46 @@ _ATTRIBUTES = {name: name for name in _ABOUT} | {
 
 
 def embedded(motion: Record | Suite) -> dict[str, xr.Variable]:
-    """The variables that hold a record or a suite."""
+    """Return the variables that hold a record or a suite."""
     records = motion.components if isinstance(motion, Suite) else (motion,)
-    samples = np.concatenate([(one.times, one.acceleration) for one in records], axis=1)
+    samples = np.concatenate([(record.times, record.acceleration) for record in records], axis=1)
     described = zip(RECORD_SAMPLES.items(), samples, strict=True)
-    found = {name: xr.Variable((RECORD_DIM,), values, about) for (name, about), values in described}
+    variables = {
+        name: xr.Variable((RECORD_DIM,), values, about) for (name, about), values in described
+    }
     if isinstance(motion, Record):
-        return found
+        return variables
     each = 2 if motion.has_pairs else 1
     columns: dict[str, NDArray[Any]] = {
         _LABEL: np.repeat(np.array(motion.labels, dtype=object), each),
-        _COUNT: np.array([one.times.size for one in records], np.int32),
+        _COUNT: np.array([record.times.size for record in records], np.int32),
     }
     if motion.has_pairs:
         columns[_COMPONENT] = np.tile(np.array([1, 2], np.int8), len(motion))
     for name, key in _ATTRIBUTES.items():
-        texts = [one.attrs.get(key, "") for one in records]
+        texts = [record.attrs.get(key, "") for record in records]
         if name not in columns and any(texts):
             columns[name] = np.array(texts, dtype=object)
-    return found | {
+    return variables | {
         name: xr.Variable((SUITE_DIM,), values, _ABOUT[name]) for name, values in columns.items()
     }
 
 
 def read_embedded(file: xr.Dataset, path: Path) -> Record | Suite | None:
-    """The motion that a result holds, if it holds one (InputError: it is none, another program has changed it)."""
+    """Return the motion in a result, or None (InputError: another program has changed it)."""
     if any(name not in file for name in RECORD_SAMPLES):
         return None
     times, acceleration = (file[name].values.astype(np.float64) for name in RECORD_SAMPLES)
-    about = {
+    attributes = {
         key: str(text)
         for key, text in file.attrs.items()
         if key == "baseline" or key.startswith("record")
     }
-    name = about.get("record", str(path))
+    name = attributes.get("record", str(path))
     try:
-        return (
-            _suite(file, times, acceleration)
-            if _COUNT in file
-            else Record(times, acceleration, name, about)
-        )
+        if _COUNT in file:
+            return _suite(file, times, acceleration)
+        return Record(times, acceleration, name, attributes)
     except InputError as error:
         raise InputError(f"{path}: {str(error).removeprefix(f'{name}: ')}") from None
 
@@ -121,11 +121,11 @@ def _suite(file: xr.Dataset, times: NDArray[Any], acceleration: NDArray[Any]) ->
         )
     labels = columns.pop(_LABEL)
     records = []
-    for at, own in enumerate(
+    for at, samples in enumerate(
         zip(np.split(times, ends[:-1]), np.split(acceleration, ends[:-1]), strict=True)
     ):
         attrs = {key: texts[at] for key, texts in columns.items() if texts[at]}
-        records.append(Record(*own, attrs.get("record", labels[at]), attrs))
+        records.append(Record(*samples, attrs.get("record", labels[at]), attrs))
     name = str(file.attrs.get("suite", "suite"))
     text = str(file.attrs.get("left_out_vertical", ""))
     left_out = tuple(text.split(", ")) if text else ()
@@ -138,12 +138,14 @@ def _suite(file: xr.Dataset, times: NDArray[Any], acceleration: NDArray[Any]) ->
 
 
 def digest_of(motion: Record | Suite) -> str:
-    """Digest of the samples and labels of motions, by which a run to be resumed knows them."""
-    found = embedded(motion)
+    """Digest of the samples and labels of motions, which must agree for a run to be resumed."""
+    variables = embedded(motion)
     values = [
-        found[name].values
+        variables[name].values
         for name in (*RECORD_SAMPLES, _COUNT, _COMPONENT, _LABEL)
-        if name in found
+        if name in variables
     ]
-    parts = [one.tobytes() if one.dtype != object else "\0".join(one).encode() for one in values]
+    parts = [
+        array.tobytes() if array.dtype != object else "\0".join(array).encode() for array in values
+    ]
     return hashlib.sha256(b"\0".join(parts)).hexdigest()

@@ -1,4 +1,4 @@
-"""Results opened as datasets, whatever program has had them in hand since; what they hold, in words and counts."""
+"""Results opened as datasets, also if other programs have changed them; their contents in words."""
 
 import os
 from pathlib import Path
@@ -13,18 +13,18 @@ from slipsweep.files.outputs import NO_LOCKS
 from slipsweep.files.selection import units_text
 from slipsweep.grid.chunks import CHUNK_CELLS, chunk_lengths, grid_chunks
 from slipsweep.locks import has_locks
-from slipsweep.model import variables as known
+from slipsweep.model import variables
 
-#: All that a command of slipsweep writes, but for the samples of records.
+#: Results that commands of slipsweep write, but for the samples of records.
 _RESULTS = {
-    **known.RECORD_RESULTS,
-    **known.LIMIT_RESULTS,
-    **known.HISTORY,
-    **known.STATISTICS,
-    **known.RESULTS,
+    **variables.RECORD_RESULTS,
+    **variables.LIMIT_RESULTS,
+    **variables.HISTORY,
+    **variables.STATISTICS,
+    **variables.RESULTS,
 }
 
-#: Columns of the table of motions: what stands above, by its coordinate.
+#: Columns of the table of motions: the heading of each coordinate.
 _MOTION_COLUMNS = {
     "motion_samples": "samples",
     "motion_interval": "interval (s)",
@@ -39,7 +39,7 @@ _MOTION_COLUMNS = {
 
 
 def place_of(text: str | os.PathLike[str]) -> Path | str:
-    """A result as typed: a path, or the address of a store for fsspec (``s3://…``)."""
+    """Return the place of a result: a path, or the address of a store for fsspec (``s3://…``)."""
     return os.fspath(text) if "://" in os.fspath(text) else Path(text)
 
 
@@ -62,7 +62,7 @@ def open_result(path: str | os.PathLike[str]) -> xr.Dataset:
     Raises
     ------
     InputError
-        There is none, it cannot be read, or it was not written by slipsweep.
+        There is no result, it cannot be read, or it was not written by slipsweep.
 
     See Also
     --------
@@ -71,7 +71,8 @@ def open_result(path: str | os.PathLike[str]) -> xr.Dataset:
     Examples
     --------
     >>> import slipsweep
-    >>> slipsweep.sweep(theta=5, mu_s=0.4, amplitude=[4.0, 6.0], frequency=2.0).to_netcdf("first.nc")
+    >>> computed = slipsweep.sweep(theta=5, mu_s=0.4, amplitude=[4.0, 6.0], frequency=2.0)
+    >>> computed.to_netcdf("first.nc")
     >>> result = slipsweep.open_result("first.nc")
     >>> print(f"{result.permanent_displacement.max().compute().item():.3f} m")
     0.445 m
@@ -79,17 +80,17 @@ def open_result(path: str | os.PathLike[str]) -> xr.Dataset:
     table = read_result(path)
     stored = {
         dim: length
-        for one in table.values()
-        for dim, length in (one.encoding.get("preferred_chunks") or {}).items()
+        for result in table.values()
+        for dim, length in (result.encoding.get("preferred_chunks") or {}).items()
     }
-    widest: Any = max((one.sizes for one in table.data_vars.values()), key=len, default={})
+    widest: Any = max((result.sizes for result in table.data_vars.values()), key=len, default={})
     return table.chunk(
         stored or (chunk_lengths(widest, CHUNK_CELLS) if 0 not in widest.values() else {})
     )
 
 
 def read_result(path: str | os.PathLike[str]) -> xr.Dataset:
-    """Open a result without dask: values are read when they are asked for (InputError as `open_result`)."""
+    """Open a result without dask; values are read when used (InputError: see `open_result`)."""
     table = _open(path)
     if (
         not str(table.attrs.get("source", "")).startswith("slipsweep ")
@@ -97,24 +98,24 @@ def read_result(path: str | os.PathLike[str]) -> xr.Dataset:
     ):
         raise InputError(f"{path}: not written by slipsweep, or its global attributes are lost")
     for name, stored in dict(table.variables).items():
-        # how values are stored, not what they mean
+        # these say how values are stored, not what they mean
         fills = [table[name].attrs.pop(key, None) for key in ("_FillValue", "missing_value")]
         if stored.dtype.kind in "UST":
             table[name] = table[name].astype(object)
-        dtype = np.dtype(known.RESULT_DTYPES.get(str(name), "f8"))
+        dtype = np.dtype(variables.RESULT_DTYPES.get(str(name), "f8"))
         if dtype.kind == "i":
             missing = [fill for fill in fills if fill is not None]
             table[name] = _as_codes(table[name], dtype, missing)
-            # with it xarray would write NaN, which joins leave, as 0
+            # with this dtype xarray would write NaN, which joins leave, as 0
             table[name].encoding.pop("dtype", None)
     return table
 
 
 def _as_codes(codes: xr.DataArray, dtype: np.dtype[Any], fills: list[float]) -> xr.DataArray:
-    """Return codes as whole numbers, of which another program may have made other numbers.
+    """Return codes as whole numbers; another program may have made floating-point numbers of them.
 
-    A missing code is -1. Flags have no such code: where some are missing they stay numbers, NaN
-    where they are missing, since 0 would say that no flag is raised.
+    A missing code is -1.  Flags have no such code: if some are missing, they stay floating-point
+    numbers, NaN where they are missing.  A 0 would mean that no flag is raised.
     """
     for fill in fills:
         if fill != -1:
@@ -135,10 +136,12 @@ def _are_missing(values: xr.DataArray) -> bool:
 
 
 def _open(path: str | os.PathLike[str]) -> xr.Dataset:
-    """Open a netCDF file or a Zarr store, its values decoded but for codes."""
-    # codes stay whole numbers: a fill value would make them floating-point ones
+    """Open a netCDF file or a Zarr store; all values are decoded but codes."""
+    # a decoded fill value would make codes floating-point numbers
     codes = {
-        name: False for name, dtype in known.RESULT_DTYPES.items() if np.dtype(dtype).kind == "i"
+        name: False
+        for name, dtype in variables.RESULT_DTYPES.items()
+        if np.dtype(dtype).kind == "i"
     }
     how: dict[str, Any] = {"mask_and_scale": codes, "decode_times": False}
     place = place_of(path)
@@ -152,9 +155,9 @@ def _open(path: str | os.PathLike[str]) -> xr.Dataset:
             ) from None
         if "unfinished" in table.attrs:
             raise InputError(f"{path}: is not finished; run its sweep again with --resume")
-        # a store has no order: slipsweep's own
+        # a store has no order of its variables: they get slipsweep's
         order = dict.fromkeys(
-            (*known.PARAMETERS, *known.MOTION_COORDINATES, *_RESULTS, *table.variables)
+            (*variables.PARAMETERS, *variables.MOTION_COORDINATES, *_RESULTS, *table.variables)
         )
         return table[[name for name in order if name in table.variables]]
     parts = place if place.suffix == ".part" else place.with_name(f"{place.name}.part")
@@ -170,7 +173,7 @@ def _open(path: str | os.PathLike[str]) -> xr.Dataset:
         raise InputError(f"{path}: is neither a netCDF file nor a Zarr store of format 3")
     try:
         return xr.open_dataset(place, engine="netcdf4", **how)
-    except Exception as error:  # netCDF4 and xarray raise what they like on a damaged file
+    except Exception as error:  # netCDF4 and xarray raise many types on a damaged file
         if not has_locks(place):
             raise InputError(f"{path}: cannot be read: {NO_LOCKS}") from None
         if isinstance(error, PermissionError):
@@ -182,7 +185,7 @@ def _open(path: str | os.PathLike[str]) -> xr.Dataset:
 
 
 def check_zarr(path: object) -> None:
-    """Refuse a Zarr store where the packages are missing that read and write it."""
+    """Raise InputError if the packages that read and write Zarr stores are missing."""
     check_extra(f"{path}: a Zarr store", "zarr", "zarr", "fsspec")
 
 
@@ -191,14 +194,15 @@ def _first_line(error: Exception) -> str:
 
 
 def result_names(table: xr.Dataset) -> list[str]:
-    """Names of the results of a file: slipsweep's own, and those that lie along the same dimensions.
+    """Return the names of the results of a file, also of those that another program added.
 
-    The samples of a record do not, nor do bounds of cells that another program added.
+    These lie along the same dimensions as slipsweep's own.  The samples of a record do not, nor do
+    bounds of cells.
     """
     names = [str(name) for name in table.data_vars]
     dims = {
         dim
-        for name in [one for one in names if one in _RESULTS] or names
+        for name in [name for name in names if name in _RESULTS] or names
         for dim in table[name].dims
     }
     dims -= {RECORD_DIM, SUITE_DIM}
@@ -206,39 +210,42 @@ def result_names(table: xr.Dataset) -> list[str]:
 
 
 def coordinate_texts(table: xr.Dataset) -> dict[str, str]:
-    """The coordinates in words, but for what the table of motions says."""
+    """Return the coordinates in words, but for those in the table of motions."""
     suite = bool(motions_text(table))
     return {
-        str(name): f"{one.size} motions" if suite and name == "motion" else values_text(one)
-        for name, one in table.coords.items()
-        if not (suite and name in known.MOTION_COORDINATES and one.dims == ("motion",))
+        str(name): f"{coordinate.size} motions"
+        if suite and name == "motion"
+        else values_text(coordinate)
+        for name, coordinate in table.coords.items()
+        if not (suite and name in variables.MOTION_COORDINATES and coordinate.dims == ("motion",))
     }
 
 
 def values_text(values: xr.DataArray) -> str:
-    """The values of a coordinate in words."""
+    """Return the values of a coordinate in words."""
     if values.dtype.kind in "OUST":
         return ", ".join(map(str, values.values.ravel()))
-    there = values.values[np.isfinite(values.values)]
-    if values.size == 1 == there.size:
-        return f"{there.min():.6g}{units_text(values)}"
-    ends = f", {there.min():.6g} to {there.max():.6g}{units_text(values)}" if there.size else ""
-    missing = f", {values.size - there.size} missing" if there.size < values.size else ""
+    numbers = values.values[np.isfinite(values.values)]
+    units = units_text(values)
+    if values.size == 1 == numbers.size:
+        return f"{numbers.min():.6g}{units}"
+    ends = f", {numbers.min():.6g} to {numbers.max():.6g}{units}" if numbers.size else ""
+    missing = f", {values.size - numbers.size} missing" if numbers.size < values.size else ""
     return f"{values.size} values{ends}{missing}"
 
 
 def variable_texts(table: xr.Dataset) -> dict[str, str]:
-    """The variables in words."""
+    """Return the variables in words."""
     return {
-        str(name): f"{one.attrs.get('long_name', '')}{units_text(one, ', ')} "
-        f"({'text' if one.dtype.kind in 'OUST' else one.dtype})".lstrip(", ")
-        for name, one in table.data_vars.items()
-        if one.dims != (SUITE_DIM,)
+        str(name): f"{variable.attrs.get('long_name', '')}{units_text(variable, ', ')} "
+        f"({'text' if variable.dtype.kind in 'OUST' else variable.dtype})".lstrip(", ")
+        for name, variable in table.data_vars.items()
+        if variable.dims != (SUITE_DIM,)
     }
 
 
 def motions_text(table: xr.Dataset) -> tuple[str, ...]:
-    """The motions of a suite as a table, a header and a line each; empty without them."""
+    """Return the motions of a suite as lines of a table, a header first; without a suite none."""
     if (
         "motion" not in table.coords
         or table["motion"].dims != ("motion",)

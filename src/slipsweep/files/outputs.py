@@ -1,6 +1,6 @@
-"""Outputs that are complete, or not there, and never what a command reads.
+"""Outputs of commands, which are complete or not there, and never replace what a command reads.
 
-What is being written has another name until it is finished and on the disk itself.
+An output has a temporary name until it is complete and on the disk itself.
 """
 
 import itertools
@@ -15,15 +15,15 @@ from slipsweep.errors import InputError, RunError
 from slipsweep.grid.resources import size_text
 from slipsweep.locks import has_locks
 
-#: How an output that is there is refused.
+#: Message for an output that exists already.
 EXISTS = "{path}: exists already; give --overwrite to replace it, or another name with -o"
 
-#: What to do where the netCDF library cannot lock a file.
+#: Advice if the netCDF library cannot lock a file.
 NO_LOCKS = "the file system has no locks; set HDF5_USE_FILE_LOCKING=FALSE to go without"
 
 
 def check_endings(paths: Iterable[Path | str], endings: Collection[str]) -> None:
-    """Refuse outputs whose names end in what the command cannot write (InputError)."""
+    """Raise InputError if an output has an ending that the command does not write."""
     for path in paths:
         if Path(path).suffix not in endings:
             one_of = "one of " if len(endings) > 1 else ""
@@ -37,10 +37,11 @@ def check_outputs(
     reads: Sequence[Path | int],
     endings: Collection[str] = (),
 ) -> list[Path]:
-    """The outputs of a command, none that cannot be written, may not be replaced, or is what it `reads` (InputError).
+    """Return the outputs of a command; every command calls this before it computes anything.
 
-    Every command that writes comes here before it computes anything.  What it reads are files, or
-    0, standard input. Files are compared, not their names: a link is what it points to.
+    `reads` are files that the command reads, or 0 for standard input.  Links are followed, so that
+    files are compared, not names.  InputError: an output cannot be written, may not be replaced, or
+    is a file that the command reads.
     """
     paths = list(output or ())
     if endings:
@@ -53,9 +54,9 @@ def check_outputs(
                     and os.path.exists(read)
                     and os.path.samestat(os.stat(path), os.stat(read))
                 ):
-                    own = f"{read or 'standard input'}, which this command reads"
+                    source = f"{read or 'standard input'}, which this command reads"
                     raise InputError(
-                        f"{path}: writing it would replace {own}; give another name with -o"
+                        f"{path}: writing it would replace {source}; give another name with -o"
                     )
             folder = real_path(path).parent
             if not folder.is_dir():
@@ -80,11 +81,11 @@ def check_outputs(
 def complete_or_absent(path: Path, overwrite: bool) -> Iterator[Path]:
     """Yield a temporary name beside `path`; what is written there becomes `path` on success.
 
-    On any error or interruption `path` stays as it was.  A link stays, and the file that it points
-    to is written.  RunError: it cannot be written, or another process made it.
+    On an error or interruption `path` stays as it was.  A link stays a link, and the file that it
+    points to is written.  RunError: the file cannot be written, or another process made it.
     """
     target = real_path(path)
-    # not made of the output's name, which may be as long as the system allows
+    # without the output's name, which may be as long as the system allows
     temporary = target.with_name(f".slipsweep-{os.getpid()}-{secrets.token_hex(4)}.tmp")
     try:
         with writing(path):
@@ -95,36 +96,37 @@ def complete_or_absent(path: Path, overwrite: bool) -> Iterator[Path]:
 
 
 def real_path(path: Path) -> Path:
-    """Return the file that a link points to; of another path, itself."""
+    """Return the file that a link points to; any other path is returned unchanged."""
     return Path(os.path.realpath(path)) if path.is_symlink() else path
 
 
 def appear(temporary: Path, path: Path, overwrite: bool) -> None:
-    """Give a finished file, or folder of files, its name (RunError: it exists, and may not be replaced)."""
+    """Give a finished file or folder its name (RunError: it exists and may not be replaced)."""
     if os.path.lexists(path) and not overwrite:
         raise RunError(f"{path}: was made by another process during the run; it is left alone")
     if temporary.is_dir():
         if path.is_dir():
             shutil.rmtree(path)
     else:
-        with temporary.open("r+b") as file:  # on the disk itself: a power cut does not take it back
+        with temporary.open("r+b") as file:  # to the disk itself, in case of a power cut
             os.fsync(file.fileno())
     os.replace(temporary, path)
 
 
 @contextmanager
 def writing(path: Path | str) -> Iterator[None]:
-    """Turn what the system and the netCDF library raise while an output is written into one line (RunError)."""
+    """Turn errors of the system and the netCDF library into a RunError of one line."""
     try:
         yield
     except (OSError, RuntimeError) as error:
         if isinstance(error, RunError):
             raise
-        message = f"{path}: writing failed: {(error.strerror if isinstance(error, OSError) else None) or error}"
+        reason = error.strerror if isinstance(error, OSError) else None
+        message = f"{path}: writing failed: {reason or error}"
         folder = Path(path).parent
         if str(path).endswith(".nc") and not has_locks(folder):
             raise RunError(f"{message}: {NO_LOCKS}") from error
-        # all that the netCDF library says of a full disk is "HDF error"
+        # on a full disk the netCDF library says no more than "HDF error"
         with suppress(OSError):  # the folder itself may be gone
             usage = shutil.disk_usage(folder)
             if usage.total:  # some file systems have no size, and are never full

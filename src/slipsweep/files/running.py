@@ -1,6 +1,6 @@
-"""A run: the chunks of a job computed and written, here or by the workers of dask.distributed.
+"""Runs: the chunks of a job are computed and written, here or by workers of dask.distributed.
 
-A worker that is lost costs its chunks once more: distributed computes them again on another.
+The chunks of a worker that is lost are computed again on another.
 """
 
 import importlib
@@ -28,39 +28,39 @@ from slipsweep.files.storing import Chunks, Place, ZarrChunks
 from slipsweep.grid.chunks import CHUNK_CELLS, chunk_lengths
 from slipsweep.grid.plans import Plan
 from slipsweep.grid.resources import size_text
-from slipsweep.grid.tally import Tally, tally_of
+from slipsweep.studies.result_counts import Tally, tally_of
 
 if TYPE_CHECKING:
     from distributed import Client
 
-#: Resident memory of a run, and of a worker of this machine, beside its chunks.
+#: Resident memory, in bytes, of a run, and of a worker of this machine, without its chunks.
 _BASE_MEMORY = 430_000_000
 _WORKER_MEMORY = 250_000_000
 
-#: Chunks for each worker, so that all end at about the same time, and the least work of one, in
-#: cells of a sine.
+#: Chunks for each worker, so that all workers end at about the same time, and the least work of a
+#: chunk, in cells under a sine.
 _CHUNKS_A_WORKER = 16
 _LEAST_WORK = 500_000
 
 #: Most processes that `--workers` starts on one machine.
 _MOST_WORKERS = 1024
 
-#: Chunks that are on the workers at a time, for each of their threads: one is solved while another
-#: comes back.
+#: Chunks that each thread of the workers has at a time: one is solved while the results of the
+#: other are sent back.
 _AHEAD = 2
 
-#: Seconds between two looks for workers, and for which there may be none.
+#: Seconds between two looks for workers, and seconds for which there may be no worker.
 _LOOK = 5.0
 _PATIENCE = 60.0
 
 
 @dataclass(frozen=True)
 class Report:
-    """What `run` did; `found`: the output was complete by an earlier run, and nothing was computed."""
+    """Result of `run`; if the output `was_complete` by an earlier run, nothing was computed."""
 
     path: Place
     tally: Tally
-    found: bool = False
+    was_complete: bool = False
 
 
 def run(
@@ -104,7 +104,7 @@ def run(
         check_outputs([path], overwrite or resume, reads=job.spec.files)
         path = real_path(path)
     if resume and (complete := _complete(job, path)) is not None:
-        return Report(path, tally_of(complete), found=True)
+        return Report(path, tally_of(complete), was_complete=True)
     processes = workers or (64 if scheduler else 0)
     most = _most_cells(plan, memory, workers or 0)
     lengths = chunk_lengths(plan.sizes, _chunk_cells(plan, most, processes), plan.together)
@@ -126,7 +126,7 @@ def run(
         for (number, chunk), results in itertools.chain(kept, computed):
             if results is not None:
                 chunks.write(number, chunk, results)
-            del results  # before the next is solved
+            del results  # to free the memory before the next chunk is solved
             if progress is not None:
                 progress(plan.part(chunk).cells)
         chunks.finish(overwrite, remarks)
@@ -134,46 +134,52 @@ def run(
 
 
 def _complete(job: Job, path: Place) -> xr.Dataset | None:
-    """The output, if it is there and of this very sweep."""
+    """Return the output, if it exists and is complete (InputError: it is of another sweep)."""
     if isinstance(path, Path) and not path.exists():
         return None
     try:
-        found = read_result(path)
+        table = read_result(path)
     except InputError:
         if isinstance(path, Path):
             raise
         return None  # nothing is at the address, or a store that is not finished
-    if found.attrs.get(RUN) != job.digest:
+    if table.attrs.get(RUN) != job.digest:
         raise InputError(
-            f"{path}: is of another sweep or version; give --overwrite to replace it, or another name with -o"
+            f"{path}: is of another sweep or version; give --overwrite to replace it, or another "
+            "name with -o"
         )
-    check_grid(found, job.plan.template().coords, path)
-    return found
+    check_grid(table, job.plan.template().coords, path)
+    return table
 
 
 def _most_cells(plan: Plan, memory: int | None, workers: int) -> float:
-    """Number of cells of a chunk that the memory holds, if it is limited."""
+    """Return the number of cells of a chunk that the memory holds; infinity: it is not limited."""
     if memory is None:
         return math.inf
     base = _BASE_MEMORY + plan.memory + workers * (_WORKER_MEMORY + plan.memory)
     results = sum(
-        one.dtype.itemsize
-        * math.prod(size for dim, size in one.sizes.items() if dim not in plan.sizes)
-        for one in plan.template().data_vars.values()
+        result.dtype.itemsize
+        * math.prod(size for dim, size in result.sizes.items() if dim not in plan.sizes)
+        for result in plan.template().data_vars.values()
     )
-    # in this process a chunk and its copies while it is written; a worker has one, and others are
-    # on their way
+    # this process has a chunk, and its copies while it is written; a worker has one chunk, and
+    # others are being sent
     cell = (2 + 3 * workers) * results + plan.cell_memory + 8
     most = (memory - base) // cell
     if most < 1000:
         raise InputError(
-            f"--memory = {size_text(memory)}: must be {size_text(1.01 * (base + 1000 * cell))} at least"
+            f"--memory = {size_text(memory)}: must be {size_text(1.01 * (base + 1000 * cell))} "
+            "at least"
         )
     return most
 
 
 def _chunk_cells(plan: Plan, most: float, processes: int) -> int:
-    """Number of cells of a chunk: seconds of work, enough chunks for all processes; cheap cells fill the memory."""
+    """Return the number of cells of a chunk.
+
+    A chunk is some seconds of work, and there are enough chunks for all processes.  Cells that cost
+    little fill the memory that is allowed.
+    """
     cells = max(1, int(CHUNK_CELLS / plan.cost))
     if processes:
         share = math.prod(plan.sizes.values()) // (_CHUNKS_A_WORKER * processes)
@@ -184,11 +190,14 @@ def _chunk_cells(plan: Plan, most: float, processes: int) -> int:
 
 @contextmanager
 def _connected(workers: int | None, scheduler: str | None) -> "Iterator[Client]":
-    """Start so many processes on this machine, of one thread each, or connect to a scheduler (RunError)."""
+    """Start workers on this machine, of one thread each, or connect to a scheduler.
+
+    RunError: no scheduler answers.
+    """
     from distributed import Client, LocalCluster
     from distributed.utils import silence_logging_cmgr
 
-    # what it logs about lost workers is no news here: the run goes on, or ends with one message
+    # its log of lost workers helps nobody: the run goes on, or ends with one message
     with silence_logging_cmgr(logging.CRITICAL):
         if scheduler is None:
             local = LocalCluster(
@@ -197,7 +206,7 @@ def _connected(workers: int | None, scheduler: str | None) -> "Iterator[Client]"
                 host="127.0.0.1",
                 dashboard_address="127.0.0.1:0",
                 preload=[__name__],  # calls `dask_setup`
-                memory_limit=0,  # chunks are sized to fit: no worker is to be paused or killed over them
+                memory_limit=0,  # no worker is paused or killed: chunks are made to fit
                 silence_logs=logging.CRITICAL,
             )
             with local, Client(local) as client:
@@ -218,12 +227,12 @@ def _connected(workers: int | None, scheduler: str | None) -> "Iterator[Client]"
 
 
 def dask_setup(worker: object) -> None:
-    """Leave Ctrl-C, which a terminal sends to all processes, to the one that closes the cluster; dask calls this."""
+    """Ignore Ctrl-C in a worker, as the process that closes the cluster handles it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _check_versions(client: "Client", scheduler: str) -> None:
-    """Refuse workers that would compute something else."""
+    """Raise RunError if there are no workers, or workers with another version of slipsweep."""
     try:
         client.wait_for_workers(1, timeout=_PATIENCE)
     except TimeoutError:
@@ -231,21 +240,24 @@ def _check_versions(client: "Client", scheduler: str) -> None:
             f"the scheduler at {scheduler} has no workers: start some with: dask worker {scheduler}"
         )
         raise RunError(message) from None
-    # the lambda is sent as code: workers need not have this module
+    # a lambda is sent as code, so that workers need not have this module
     versions = client.run(
         lambda: importlib.import_module("slipsweep._version").__version__, on_error="return"
     )
-    for worker, found in versions.items():
-        if found != __version__:
+    for worker, version in versions.items():
+        if version != __version__:
             raise RunError(
-                f"slipsweep at the worker {worker}: {found}, in this process: {__version__}"
+                f"slipsweep at the worker {worker}: {version}, in this process: {__version__}"
             )
 
 
 def _computed(
     client: "Client", tasks: Iterable[tuple[Any, Callable[[], Any]]]
 ) -> Iterator[tuple[Any, Any]]:
-    """Carry out tasks, each given with its name, and yield what they return as it comes back (RunError: none does)."""
+    """Carry out named tasks, and yield the name and the result of each as it comes back.
+
+    RunError: there are no workers any more, or the scheduler was lost.
+    """
     from distributed import CancelledError, KilledWorker, wait
 
     names: dict[Any, Any] = {}
@@ -267,7 +279,9 @@ def _computed(
             if time.monotonic() - seen > _PATIENCE:
                 raise RunError(f"there has been no worker for {_PATIENCE:.0f} s") from None
         except KilledWorker as error:
-            message = f"a chunk was lost with several workers in turn ({error}): do they run out of memory?"
-            raise RunError(message) from None
+            raise RunError(
+                f"a chunk was lost with several workers in turn ({error}): do they run out of "
+                "memory?"
+            ) from None
         except (CancelledError, OSError) as error:
             raise RunError(f"the scheduler was lost: {error}") from None

@@ -1,8 +1,8 @@
 """Sweep files: TOML text in, the arguments of `slipsweep.sweep` out.
 
-Here keys are checked, axes become arrays in their own units, and what two tables say of one thing
-is refused.  Those that take the values know what they may be.  A refusal is an `InputError`,
-``FILE: key = VALUE: what is allowed``.
+This module checks the keys, makes arrays of the axes in their own units, and refuses a parameter
+that two tables give.  Values are checked by the functions that take them.  A refusal is an
+`InputError`, ``FILE: key = VALUE: what is allowed``.
 """
 
 import tomllib
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError, did_you_mean
 from slipsweep.files import motions, opening
-from slipsweep.grid.inputs import Inputs
+from slipsweep.grid.inputs import Inputs, given_inputs
 from slipsweep.model import choices, options, parameters, units, variables
 from slipsweep.motion import reading, records, suites
 from slipsweep.motion.waveforms import WAVEFORMS, Waveform
@@ -30,22 +30,6 @@ if TYPE_CHECKING:
 #: Inputs that [axes] and [[cases]] may give; `polarity` is one of [excitation].
 _INPUTS = tuple(name for name in variables.PARAMETERS if name != "polarity")
 
-#: Parameters that [model] may give as one number for the whole sweep.
-_MODEL_PARAMETERS = (
-    "yield_acceleration",
-    "yield_coefficient",
-    "upslope_yield_acceleration",
-    "decay_rate",
-    "delta_mu",
-    "minimum_friction",
-    "residual_mu",
-    "residual_phi",
-    "weakening_distance",
-    "fast_mu",
-    "rate_constant",
-    "structure_frequency",
-)
-
 #: Tables that are a choice with its options.
 _FAMILIES: tuple[choices.Family[Any], ...] = (options.MODELS, WAVEFORMS, options.SOLVERS)
 
@@ -55,14 +39,14 @@ _RECORD_KEYS = (
     "records",
     "pairs",
     "vertical",
-    *(one.name for one in choices.declared(reading.Reading)),
+    *(option.name for option in choices.declared(reading.Reading)),
     "polarity",
 )
 
 
 @dataclass(frozen=True)
 class Output:
-    """Where the result goes and what it holds: the table [output]; `variables` None: those of the kind of sweep."""
+    """The table [output].  `variables` None stands for the default results of the kind of sweep."""
 
     path: str | None = None
     title: str = "Permanent displacement of a rigid block on a shaken inclined base"
@@ -71,8 +55,7 @@ class Output:
     compression: int = 0
 
 
-#: The keys of each table, and their defaults where these are not declared elsewhere; None: there is
-#: none.
+#: The keys of each table, with the defaults that are not declared elsewhere; None: no default.
 KEYS: dict[str, dict[str, Any]] = {
     "axes": dict.fromkeys(_INPUTS),
     "axes.NAME": {
@@ -84,19 +67,22 @@ KEYS: dict[str, dict[str, Any]] = {
         "units": None,
     },
     "cases": dict.fromkeys(("label", *_INPUTS)),
-    **{one.keyword: {one.key: one.default} | dict.fromkeys(one.options) for one in _FAMILIES},
+    **{
+        family.keyword: {family.key: family.default} | dict.fromkeys(family.options)
+        for family in _FAMILIES
+    },
     "output": asdict(Output()) | {"variables": list(variables.DEFAULT_RESULTS)},
     "uncertainty": {"samples": 4096, "method": "sobol", "seed": 0, "quantiles": [0.05, 0.5, 0.95]}
     | {"thresholds": [0.01, 0.1, 1.0], "correlation": [], "sensitivity": False, "over": []}
     | dict.fromkeys(variables.DRAWN),
 }
-KEYS["model"] |= dict.fromkeys(_MODEL_PARAMETERS) | {"yield_acceleration": "coulomb"}
+KEYS["model"] |= dict.fromkeys(variables.MODEL_INPUTS) | {"yield_acceleration": "coulomb"}
 KEYS["excitation"] |= dict.fromkeys(_RECORD_KEYS) | {"polarity": 1}
 
-#: Largest number of points on one axis: 80 MB of coordinates, more than any grid can use.
+#: Largest number of points on an axis: 80 MB of coordinates, more than any grid can use.
 _MOST_POINTS = 10_000_000
 
-#: How netCDF files begin: netCDF-4, and the classic formats.
+#: First bytes of netCDF files: netCDF-4, and the classic formats.
 _NETCDF = (b"\x89HDF", b"CDF")
 
 #: The motions of records, as [excitation] gives them.
@@ -117,8 +103,8 @@ class SweepSpec:
     excitation: Waveform | Recorded
     solver: options.Solver
     output: Output
-    sampling: "Sampling | None" = None  # what [uncertainty] says: the results are statistics
-    files: tuple[Path | int, ...] = ()  # that were read for it, by name or descriptor
+    sampling: "Sampling | None" = None  # of [uncertainty]; then the results are statistics
+    files: tuple[Path | int, ...] = ()  # the files that were read, by name or descriptor
 
     @property
     def recorded(self) -> Recorded | None:
@@ -127,10 +113,10 @@ class SweepSpec:
 
     @property
     def grid(self) -> dict[str, xr.DataArray]:
-        """Coordinates by which cells of the result differ, and parameters with one value."""
+        """Coordinates of the result that the sweep file gives, also those with one value."""
         over = () if self.sampling is None else self.sampling.over
         grid = {}
-        for name, value in self.inputs.given.items():
+        for name, value in self.inputs.items():
             values = [1, -1] if isinstance(value, str) else value  # polarity = "both"
             grid[name] = (
                 values
@@ -142,7 +128,7 @@ class SweepSpec:
         return {name: values for name, values in grid.items() if name not in over}
 
     def plan(self) -> "Plan":
-        """Return what the sweep file describes: a sweep, or the statistics of samples (InputError as `sweep`)."""
+        """Return the plan of the sweep, or of its statistics (InputError: see `sweep`)."""
         chosen: dict[str, Any] = {
             "excitation": self.excitation,
             "model": self.model,
@@ -160,11 +146,11 @@ class SweepSpec:
 
 
 def load(path: str | Path) -> SweepSpec:
-    """Read and check a sweep file (TOML), or a result of `slipsweep run`: then the sweep it was made from.
+    """Read and check a sweep file (TOML), or the sweep stored in a result of `slipsweep run`.
 
-    A sweep file may be a pipe, or ``-`` for standard input; the record that it names is then looked
-    for in the folder that the command runs in.  InputError: the file cannot be read, or something
-    in it is not allowed.
+    A sweep file may be a pipe, or ``-`` for standard input; its records are then looked for in the
+    folder that the command runs in.  InputError: the file cannot be read, or something in it is not
+    allowed.
     """
     path = Path(path)
     if (path / "zarr.json").is_file():
@@ -189,7 +175,7 @@ def load(path: str | Path) -> SweepSpec:
 
 
 def is_stream(path: Path) -> bool:
-    """Return True if a sweep is read from a pipe or a shell's redirection: it has no folder and no name then."""
+    """Return True if a sweep is read from a pipe or a redirection, without a name and a folder."""
     return path == Path("-") or (path.exists() and not path.is_file() and not path.is_dir())
 
 
@@ -203,7 +189,7 @@ def _load_result(path: Path) -> SweepSpec:
         recorded = motions.read_embedded(file, path)
         spec = parse(str(attributes["sweep"]), str(path), path.parent, recorded)
         check_grid(file, spec.grid, path)
-    # the solver that ran: it may have been chosen on the command line, over the sweep file's
+    # the solver that ran; on the command line another one than the sweep file's may be chosen
     with named(str(path)):
         return (
             replace(spec, solver=options.SOLVERS.from_attributes(attributes))
@@ -213,12 +199,12 @@ def _load_result(path: Path) -> SweepSpec:
 
 
 def check_grid(result: xr.Dataset, grid: Mapping[Any, xr.DataArray], source: object) -> None:
-    """Refuse a result whose grid is not that of its sweep (InputError): it was joined or cut."""
-    known = {*variables.STATISTIC_COORDINATES, motions.RECORD_DIM, motions.SUITE_DIM}
-    known |= {str(dim) for values in grid.values() for dim in values.dims}
+    """Raise InputError if the grid of a result is not that of its sweep: it was joined or cut."""
+    dims = {*variables.STATISTIC_COORDINATES, motions.RECORD_DIM, motions.SUITE_DIM}
+    dims |= {str(dim) for values in grid.values() for dim in values.dims}
     since = "results were joined or cut after their run"
     for dim in result.sizes:
-        if dim not in known:
+        if dim not in dims:
             raise InputError(
                 f"{source}: {dim}: is no dimension of the sweep that it stores: {since}"
             )
@@ -245,57 +231,71 @@ def _are_same(values: NDArray[Any], others: NDArray[Any]) -> bool:
 def parse(
     text: str, source: str, folder: Path | None = None, recorded: Recorded | None = None
 ) -> SweepSpec:
-    """Check the text of a sweep file, called `source` in errors; see `load`.
+    """Check the text of a sweep file; errors call it `source`.  See `load`.
 
-    Its records are looked for in `folder`, by default the one that the command runs in; or they are
-    those that a result has kept.
+    Its records are looked for in `folder`, by default the one that the command runs in; `recorded`
+    are those that are stored in a result.
     """
     try:
         content = tomllib.loads(text)
-    except (
-        ValueError,
-        RecursionError,
-    ) as error:  # also of integers too long to convert, and of deep nesting
+    # ValueError also for integers that are too long to convert, RecursionError for deep nesting
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{source}: not valid TOML: {error}") from None
     with named(source):
         names = [name for name in KEYS if name not in ("axes.NAME", "cases")]
-        tables = {name: dict(_known(name, content.get(name, {}), KEYS[name])) for name in names}
-        _known("", content, (*names, "cases"))
+        tables = {
+            name: dict(_check_keys(name, content.get(name, {}), KEYS[name])) for name in names
+        }
+        _check_keys("", content, (*names, "cases"))
         numbers = {
-            name: tables["model"].pop(name) for name in _MODEL_PARAMETERS if name in tables["model"]
+            name: tables["model"].pop(name)
+            for name in variables.MODEL_INPUTS
+            if name in tables["model"]
         }
         if numbers.get("yield_acceleration") == "coulomb":
             del numbers["yield_acceleration"]
         model = _chosen(options.MODELS, tables["model"])
         rows = _cases(content["cases"]) if "cases" in content else []
-        given = _inputs(tables["axes"], rows, numbers, model.g)
+        inputs = _inputs(tables["axes"], rows, numbers, model.g)
         files: tuple[Path, ...] = ()
-        if key := next((one for one in ("record", "records") if one in tables["excitation"]), None):
-            given["polarity"] = tables["excitation"].pop("polarity", 1)
+        named_keys = [key for key in ("record", "records") if key in tables["excitation"]]
+        if named_keys:
+            key = named_keys[0]
+            inputs["polarity"] = tables["excitation"].pop("polarity", 1)
             motion: Any = _recorded_motion(key, tables, folder or Path(), recorded)
             if recorded is None:
                 parts = motion.components if isinstance(motion, suites.Suite) else (motion,)
-                files = tuple(Path(one.name) for one in parts)
+                files = tuple(Path(record.name) for record in parts)
         else:
-            for other in (one for one in tables["excitation"] if one in _RECORD_KEYS):
+            for other in (key for key in tables["excitation"] if key in _RECORD_KEYS):
                 raise InputError(
-                    f"excitation.{other}: only beside excitation.record, the file of a recorded motion"
+                    f"excitation.{other}: only beside excitation.record, the file of a recorded "
+                    "motion"
                 )
             motion = _chosen(WAVEFORMS, tables["excitation"])
         sampling = _sampling(tables["uncertainty"], model.g) if "uncertainty" in content else None
         labels = tuple(str(row.get("label", number)) for number, row in enumerate(rows, 1))
-        chosen = _chosen(options.SOLVERS, tables["solver"])
+        named_solver = _chosen(options.SOLVERS, tables["solver"])
         is_default = tables["solver"].get("method", "auto") == "auto"
-        solver = options.solver_for(model, "auto" if is_default else chosen)
+        solver = options.solver_for(model, "auto" if is_default else named_solver)
         output = _output(tables["output"], sampling is not None)
         return SweepSpec(
-            source, text, Inputs(**given), labels, model, motion, solver, output, sampling, files
+            source,
+            text,
+            given_inputs(inputs),
+            labels,
+            model,
+            motion,
+            solver,
+            output,
+            sampling,
+            files,
         )
 
 
 @contextmanager
 def named(source: str) -> Iterator[None]:
-    """Name the sweep file in front of what is not allowed."""
+    """Add the name of the sweep file to the beginning of errors."""
     try:
         yield
     except InputError as error:
@@ -303,8 +303,8 @@ def named(source: str) -> Iterator[None]:
         raise
 
 
-def _known(key: str, table: Any, keys: Collection[str]) -> _Table:
-    """A table that has these keys only."""
+def _check_keys(key: str, table: Any, keys: Collection[str]) -> _Table:
+    """Return a table if it has no other keys than these."""
     if not isinstance(table, dict):
         raise InputError(f"{key} = {units.show(table)}: must be a table")
     for name in table:
@@ -316,10 +316,12 @@ def _known(key: str, table: Any, keys: Collection[str]) -> _Table:
 
 
 def _chosen(family: choices.Family[Any], table: _Table) -> Any:
-    """The choice that a table names, with its options."""
-    given = {name: value for name, value in table.items() if name != family.key}
+    """Return the choice that a table names, with its options."""
+    option_values = {name: value for name, value in table.items() if name != family.key}
     return family.made(
-        table.get(family.key, family.default), given, lambda text: f"{family.keyword}.{text}"
+        table.get(family.key, family.default),
+        option_values,
+        lambda text: f"{family.keyword}.{text}",
     )
 
 
@@ -336,31 +338,32 @@ def _sampling(table: dict[str, Any], g: float) -> "Sampling":
 
 
 def _inputs(axes: _Table, rows: list[dict[str, Any]], numbers: _Table, g: float) -> dict[str, Any]:
-    """The parameters, each from one table: [axes], [[cases]] or [model]."""
+    """Return the parameters from [axes], [[cases]] and [model] (InputError: one is given twice)."""
     columns = [name for name in rows[0] if name != "label"] if rows else []
-    given: dict[str, Any] = {name: _axis(name, axis, g) for name, axis in axes.items()}
+    inputs: dict[str, Any] = {name: _axis(name, axis, g) for name, axis in axes.items()}
     cases = {name: xr.DataArray([row[name] for row in rows], dims="case") for name in columns}
     model = {
         name: parameters.check_single(name, value, f"model.{name}")
         for name, value in numbers.items()
     }
     for table, values in (("cases", cases), ("model", model)):
-        for name in given.keys() & values.keys():
+        for name in inputs.keys() & values.keys():
             raise InputError(f"{table}.{name}: given twice: give it in one table")
-        given |= values
-    return given
+        inputs |= values
+    return inputs
 
 
 def _recorded_motion(
     key: str, tables: Mapping[str, _Table], folder: Path, recorded: Recorded | None
 ) -> Recorded:
-    """The records in files that [excitation] names, or those that a result has kept."""
+    """Return the records in files that [excitation] names, or those that a result has stored."""
     table = tables["excitation"]
-    others = [f"excitation.{one}" for one in table if one not in _RECORD_KEYS]
-    for other in others:
-        raise InputError(
-            f"{other}: not allowed with excitation.{key}, to which the response is exact"
-        )
+    for other in table:
+        if other not in _RECORD_KEYS:
+            raise InputError(
+                f"excitation.{other}: not allowed with excitation.{key}, to which the response is "
+                "exact"
+            )
     if {"record", "records"} <= {*table}:
         raise InputError("excitation.records: not allowed beside record: give one of them")
     for other in ("pairs", "vertical"):
@@ -374,10 +377,10 @@ def _recorded_motion(
         )
     if recorded is not None:
         return recorded
-    own = ("record", "records", "pairs", "vertical")
-    given = {name: value for name, value in table.items() if name not in own}
+    of_files = ("record", "records", "pairs", "vertical")
+    reading_options = {name: value for name, value in table.items() if name not in of_files}
     try:
-        how = reading.Reading(**given)
+        how = reading.Reading(**reading_options)
         if key == "record":
             return records.read_record(folder / table["record"], **how.options)
         vertical = table.get("vertical", "leave_out")
@@ -392,31 +395,33 @@ def _recorded_motion(
 
 
 def _cases(rows: Any) -> list[dict[str, Any]]:
-    """The rows of [[cases]], which all give the same parameters."""
+    """Return the rows of [[cases]], which all give the same parameters."""
     if not isinstance(rows, list) or not rows:
         raise InputError(f"cases = {units.show(rows)}: must be one table [[cases]] at least")
-    columns = [name for name in _known("cases[row 1]", rows[0], KEYS["cases"]) if name != "label"]
+    columns = [
+        name for name in _check_keys("cases[row 1]", rows[0], KEYS["cases"]) if name != "label"
+    ]
     if not columns:
         raise InputError("cases[row 1]: must give at least one parameter")
-    found = []
+    checked_rows = []
     for number, row in enumerate(rows, 1):
         key = f"cases[row {number}]"
-        for name in {*columns} ^ {*_known(key, row, KEYS["cases"])} - {"label"}:
+        for name in {*columns} ^ {*_check_keys(key, row, KEYS["cases"])} - {"label"}:
             raise InputError(
                 f"{key}.{name}: every row must give what row 1 gives: {', '.join(columns)}"
             )
-        found.append(
+        checked_rows.append(
             row
             | {name: parameters.check_single(name, row[name], f"{key}.{name}") for name in columns}
         )
-    return found
+    return checked_rows
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def _axis(name: str, given: Any, g: float) -> NDArray[np.float64]:
-    """An axis as an array in the parameter's own units."""
+def _axis(name: str, axis: Any, g: float) -> NDArray[np.float64]:
+    """Return an axis as an array in the unit of the parameter."""
     key = f"axes.{name}"
-    table = _known(key, given, KEYS["axes.NAME"])
+    table = _check_keys(key, axis, KEYS["axes.NAME"])
     if "values" in table:
         for other in table:
             if other not in ("values", "units"):
@@ -456,23 +461,25 @@ def _axis(name: str, given: Any, g: float) -> NDArray[np.float64]:
     parameters.check_values(name, values, key)
     for at in np.flatnonzero(np.diff(values) <= 0.0):
         raise InputError(
-            f"{key}: {numbers[at + 1]} after {numbers[at]}: must increase from one value to the next"
+            f"{key}: {numbers[at + 1]} after {numbers[at]}: must increase from one value to the "
+            "next"
         )
     return values
 
 
 def _output(table: _Table, has_statistics: bool) -> Output:
-    """The table [output]; which variables there are depends on the kind of sweep, whose plan checks them."""
+    """Return the table [output]; its variables, which depend on the sweep, are checked later."""
     if has_statistics and "variables" in table:
         raise InputError(
-            "output.variables: not allowed beside [uncertainty], which has statistics as its results"
+            "output.variables: not allowed beside [uncertainty], which has statistics as its "
+            "results"
         )
     for name in ("path", "title"):
         if not isinstance(table.get(name, ""), str):
             raise InputError(f"output.{name} = {units.show(table[name])}: must be a text")
     if table.get("path") == "":
         raise InputError('output.path = "": must be the name of a file')
-    found = Output(**table)
-    parameters.check_choice("output.dtype", found.dtype, ("float64", "float32"))
-    parameters.check_whole("output.compression", found.compression, 0, 9)
-    return found
+    output = Output(**table)
+    parameters.check_choice("output.dtype", output.dtype, ("float64", "float32"))
+    parameters.check_whole("output.compression", output.compression, 0, 9)
+    return output

@@ -1,13 +1,14 @@
-"""Where a chunk is written, and how a run goes on after an interruption.
+"""Chunks written to a file or store, so that an interrupted run can go on.
 
 Each chunk of a run is written once, to its place in ``OUT.nc.part/result.nc`` or
-``OUT.zarr.part/store``.  When it is there (in a netCDF file: on the disk itself), an empty file
-``000012.chunk`` beside it says so; `identity.json` says what the chunks are of, and their lengths.
+``OUT.zarr.part/store``.  When it is written (to a netCDF file: on the disk itself), an empty file
+``000012.chunk`` beside it marks it.  `identity.json` has the identity of the run, and the lengths
+of the chunks.
 
-The netCDF file is made with all but the values of its results.  Chunks change nothing else in it,
-so that it can be read whenever a run ends, and what is marked is there.  A compressed file is made
-of it at the end. A store has the attribute `unfinished` meanwhile; one at an address (``s3://…``)
-is written where it is.
+The netCDF file is made first, with everything but the values of its results.  Chunks change nothing
+else in it, so that it can be read whenever a run ends, and has all chunks that are marked.  A
+compressed file is made from it at the end.  A store has the attribute `unfinished` until its run is
+complete; a store at an address (``s3://…``) is written in place.
 """
 
 import json
@@ -40,55 +41,51 @@ from slipsweep.locks import lock_held
 #: A file or folder, or the address of a store.
 Place = Path | str
 
-#: Cells, about, of a chunk of a Zarr store within one of the run's, which is a shard of the store.
+#: Approximate number of cells in a chunk of a Zarr store.  A chunk of the run is a shard of the
+#: store, and holds several of them.
 _ZARR_CELLS = 500_000
 
 
 def nbytes_of(path: Place) -> int:
-    """Bytes that a result takes."""
+    """Return the bytes that a result takes."""
     files, root = url_to_fs(os.fspath(path))
     return int(files.du(root))
 
 
 @dataclass
 class Chunks:
-    """The chunks of a run, numbered in the order of the file: parts of a netCDF file, which this process writes."""
+    """The chunks of a run, in the order of the file; this process writes them to a netCDF file."""
 
     job: Job
     path: Place
     lengths: dict[str, int]  # of a chunk, along each dimension of the grid
-    most: float = math.inf  # cells of a chunk that the memory asked for holds
-    done: set[int] = field(default_factory=set)  # what an interrupted run has left
-    name: ClassVar[str] = (
-        "result.nc"  # of the file or store that chunks are written to, within `place`
-    )
+    most: float = math.inf  # cells of a chunk that the allowed memory holds
+    done: set[int] = field(default_factory=set)  # numbers of chunks from an interrupted run
+    #: Name of the file or store that chunks are written to, within `place`.
+    name: ClassVar[str] = "result.nc"
 
     def __post_init__(self) -> None:
-        self.place = (
-            f"{os.fspath(self.path).rstrip('/')}.part"  # what an interrupted run leaves: a folder
-        )
+        # the folder that an interrupted run leaves
+        self.place = f"{os.fspath(self.path).rstrip('/')}.part"
         self.target = self.path if isinstance(self.path, str) else f"{self.place}/{self.name}"
         try:
             self._files, self._folder = url_to_fs(self.place)
-        except (
-            ImportError,
-            ValueError,
-        ) as error:  # the package that a protocol needs, or no protocol
+        except (ImportError, ValueError) as error:  # a package is missing; not a protocol
             raise InputError(f"{self.path}: {error}") from None
 
     def __iter__(self) -> Iterator[tuple[int, Chunk]]:
-        """Number and place of every chunk, one after the other: there may be more than memory holds."""
+        """Yield the number and the place of every chunk; there may be more than memory holds."""
         plan = self.job.plan
         return enumerate(grid_chunks(plan.sizes, math.prod(self.lengths.values()), plan.together))
 
     @contextmanager
     def begun(self, command: str, resume: bool, overwrite: bool) -> Iterator[None]:
-        """Take over the chunks of an interrupted run, or begin anew, while no other run writes this output.
+        """Take over the chunks of an interrupted run, or begin anew, and lock the output.
 
-        InputError: neither may be done.  RunError: another run is writing it, or writing failed.  A
+        InputError: neither is allowed.  RunError: another run is writing it, or writing failed.  A
         note to any error says how many chunks are kept.
         """
-        # an address has no lock
+        # there are no locks at an address
         with self._locked() if isinstance(self.path, Path) else nullcontext(True) as is_locked:
             self._begin(command, resume, overwrite)
             if not is_locked:
@@ -101,13 +98,14 @@ class Chunks:
                 kept = len(self._finished())
                 if not kept:
                     self._clear()
-                note = f"{kept} of {sum(1 for _ in self)} chunks are kept in {self.place}: --resume goes on"
+                chunks = f"{kept} of {sum(1 for _ in self)} chunks"
+                note = f"{chunks} are kept in {self.place}: --resume goes on"
                 error.add_note(note if kept else "nothing written")
                 raise
 
     @contextmanager
     def _locked(self) -> Iterator[bool]:
-        """Keep other runs away from this output; False where the file system has no locks."""
+        """Lock the output against other runs; yield False if the file system has no locks."""
         folder = Path(self.place)
         try:
             with ExitStack() as stack:
@@ -128,14 +126,15 @@ class Chunks:
             state = json.loads(self._files.cat_file(f"{self._folder}/identity.json"))
         if state is None and not overwrite and self._finished():
             raise InputError(
-                f"{self.place}: has chunks that nothing identifies; --overwrite starts again without them"
+                f"{self.place}: has chunks that nothing identifies; --overwrite starts again "
+                "without them"
             )
         if state is None or overwrite:
             self._clear()
             if isinstance(self.path, Path):
                 needed = self.job.outline("").nbytes
                 free = shutil.disk_usage(self.path.parent).free
-                # a store is compressed, nobody knows how much
+                # a store is compressed, to an unknown size
                 if needed * (0.05 if self.path.suffix == ".zarr" else 1.0) > free:
                     sizes = f"takes {size_text(needed)}, but {size_text(free)} are free on the disk"
                     raise InputError(f"{self.path}: {sizes}")
@@ -167,14 +166,14 @@ class Chunks:
         self.done = self._finished()
 
     def _finished(self) -> set[int]:
-        """Numbers of the chunks that are there."""
-        return {int(Path(one).stem) for one in self._left() if one.endswith(".chunk")}
+        """Return the numbers of the chunks that are written."""
+        return {int(Path(path).stem) for path in self._left() if path.endswith(".chunk")}
 
     def _clear(self) -> None:
-        """Remove what an earlier run has left; the lock stays."""
-        for one in self._left():
-            if not one.endswith("/lock"):
-                self._files.rm(one, recursive=True)
+        """Remove the files of an earlier run; the lock stays."""
+        for path in self._left():
+            if not path.endswith("/lock"):
+                self._files.rm(path, recursive=True)
 
     def _left(self) -> list[str]:
         self._files.invalidate_cache()  # workers write there as well
@@ -191,7 +190,10 @@ class Chunks:
                 file[name][(0,) * file[name].ndim or ...] = 0
 
     def task(self, number: int, chunk: Chunk) -> Callable[[], xr.Dataset | None]:
-        """What computes a chunk, here or in a worker: it returns the results, unless it has written them itself."""
+        """Return a function that computes a chunk, here or in a worker.
+
+        It returns the results, or None if it has written them.
+        """
         return partial(_solved, self.job.plan, self.job.dtypes, chunk)
 
     def write(self, number: int, chunk: Chunk, results: xr.Dataset) -> None:
@@ -201,11 +203,11 @@ class Chunks:
             for name in self.job.dtypes:
                 file[name][_region(chunk, file[name])] = results[name].values
         with open(self.target, "rb") as written:
-            os.fsync(written.fileno())  # a power cut can no longer take it
+            os.fsync(written.fileno())  # to the disk itself, in case of a power cut
         _mark(self.place, number)
 
     def completed(self) -> str:
-        """The file or store when all chunks are there, compressed as requested, and not said to be unfinished."""
+        """Return the path of the complete file or store, compressed as requested."""
         level = self.job.spec.output.compression
         if not level:
             return self.target
@@ -241,7 +243,7 @@ def _region(chunk: Chunk, result: "netCDF4.Variable[Any]") -> Any:
 
 
 def _solved(plan: Plan, dtypes: Mapping[str, np.dtype[Any]], chunk: Chunk) -> xr.Dataset:
-    """The results of a chunk in the types of the file, without coordinates."""
+    """Return the results of a chunk in the types of the file, without coordinates."""
     table = plan.part(chunk).solve()
     return xr.Dataset(
         {name: table[name].variable.astype(dtype, copy=False) for name, dtype in dtypes.items()}
@@ -249,13 +251,13 @@ def _solved(plan: Plan, dtypes: Mapping[str, np.dtype[Any]], chunk: Chunk) -> xr
 
 
 def _mark(place: str, number: int) -> None:
-    """Say that a chunk is there."""
+    """Mark a chunk as written."""
     files, folder = url_to_fs(place)
     files.pipe_file(f"{folder}/{number:06}.chunk", b"")
 
 
 class ZarrChunks(Chunks):
-    """Chunks as regions of a Zarr store, each one shard of its arrays; workers write those that they solve."""
+    """The chunks of a run as shards of a Zarr store; workers write the chunks that they solve."""
 
     name = "store"
 
@@ -267,14 +269,13 @@ class ZarrChunks(Chunks):
         level = self.job.spec.output.compression
         encoding: dict[str, dict[str, Any]] = {}
         for name, dtype in self.job.dtypes.items():
-            # a shard for each chunk of the run, and within it chunks that are read by themselves
+            # each chunk of the run is a shard, within which smaller chunks can be read
             shard = [self.lengths.get(str(dim), size) for dim, size in table[name].sizes.items()]
             inner = list(shard)
             for axis, length in enumerate(shard):
                 if (cells := math.prod(inner)) > _ZARR_CELLS:
-                    parts = (
-                        one for one in range(1, length + 1) if length % one == 0
-                    )  # a shard holds whole chunks
+                    # a shard holds a whole number of chunks
+                    parts = (count for count in range(1, length + 1) if length % count == 0)
                     inner[axis] = length // min(
                         parts, key=lambda count: abs(math.log(cells / count / _ZARR_CELLS))
                     )
@@ -311,9 +312,8 @@ def _write_region(
 ) -> None:
     """Compute a chunk and write it to its region of a Zarr store, then its mark."""
     results = solve()
-    whole = [
-        name for name, one in results.items() if chunk.keys().isdisjoint(one.dims)
-    ]  # no region
+    # results without a dimension of the chunk are written whole
+    whole = [name for name, result in results.items() if chunk.keys().isdisjoint(result.dims)]
     for part in filter(None, (results.drop_vars(whole), results[whole])):
         region: Any = {dim: chunk[str(dim)] for dim in part.dims if dim in chunk} or None
         part.to_zarr(store, mode="r+", region=region, zarr_format=3, consolidated=False)

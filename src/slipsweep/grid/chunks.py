@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 import xarray as xr
 
-#: A part of a grid: where it lies along each dimension.
+#: A part of a grid: the slice of each dimension.
 Chunk: TypeAlias = dict[str, slice]
 
 #: Cells read, solved or written at a time: 80 MB of results, yet enough to keep the kernels busy.
@@ -17,11 +17,11 @@ CHUNK_CELLS = 4_000_000
 def chunk_lengths(
     shape: Mapping[str, int], most: int, together: Collection[str] = ()
 ) -> dict[str, int]:
-    """Return the chunk of a grid: at most `most` cells, whole along the last dimensions as far as they allow.
+    """Return the lengths of a chunk of at most `most` cells, whole along the last dimensions.
 
-    Its cells then follow one another in the file.  Among the last dimensions is the frequency, of
-    which a whole axis costs `sweep` hardly more than one value.  Dimensions `together` are cut only
-    where no other is left.
+    The cells of a chunk then follow one another in the file.  The frequency is among the last
+    dimensions, and a whole axis of it costs `sweep` hardly more than one value.  Dimensions in
+    `together` are cut last.
     """
     lengths: dict[str, int] = {}
     order = sorted(shape, key=lambda dim: dim in together)
@@ -37,7 +37,10 @@ def chunk_lengths(
 def grid_chunks(
     shape: Mapping[str, int], most: int, together: Collection[str] = ()
 ) -> Iterator[Chunk]:
-    """Cut a grid into chunks as `chunk_lengths` says, in the order of the file; a grid without cells has none."""
+    """Yield the chunks of a grid, of the lengths of `chunk_lengths`, in the order of the file.
+
+    A grid without cells has none.
+    """
     if 0 not in shape.values():
         lengths = chunk_lengths(shape, most, together)
         for corner in itertools.product(*(range(0, shape[dim], lengths[dim]) for dim in shape)):
@@ -49,7 +52,7 @@ def grid_chunks(
 
 
 def sizes_within(chunk: Chunk, sizes: Mapping[str, int]) -> dict[str, int]:
-    """Lengths of the dimensions of a grid within a chunk of it."""
+    """Return the lengths of the dimensions of a grid within a chunk of it."""
     return {
         dim: chunk[dim].stop - chunk[dim].start if dim in chunk else size
         for dim, size in sizes.items()
@@ -57,5 +60,5 @@ def sizes_within(chunk: Chunk, sizes: Mapping[str, int]) -> dict[str, int]:
 
 
 def variables_within(chunk: Chunk, variables: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:
-    """The part of variables that lies within a chunk: views, cut along the dimensions that they have."""
-    return {name: one.isel(chunk, missing_dims="ignore") for name, one in variables.items()}
+    """Return the parts of variables that lie within a chunk, as views."""
+    return {name: values.isel(chunk, missing_dims="ignore") for name, values in variables.items()}

@@ -1,4 +1,4 @@
-"""What the machine has left, and how to say sizes."""
+"""Free memory of the machine, and sizes in words."""
 
 import re
 from collections.abc import Mapping
@@ -8,15 +8,13 @@ from slipsweep.errors import InputError
 
 
 def check_memory(what: str, needed: int, advice: str) -> None:
-    """Refuse what memory cannot hold, before any of it is taken; InputError: what takes how much, and the advice."""
+    """Raise InputError, with the advice, if memory cannot hold the `needed` bytes of `what`."""
     try:
         lines = Path("/proc/meminfo").read_text().splitlines()
     except OSError:
         return
-    free = (
-        int(next((line.split()[1] for line in lines if line.startswith("MemAvailable:")), needed))
-        * 1024
-    )
+    available = (line.split()[1] for line in lines if line.startswith("MemAvailable:"))
+    free = int(next(available, needed)) * 1024
     if needed > free:
         raise InputError(
             f"{what}: takes {size_text(needed)}, but {size_text(free)} of memory is free; {advice}"
@@ -24,12 +22,12 @@ def check_memory(what: str, needed: int, advice: str) -> None:
 
 
 def grid_text(sizes: Mapping[str, int]) -> str:
-    """A grid in words, such as "2 theta x 10 amplitude"; nothing of one without dimensions."""
+    """Return a grid in words, such as "2 theta x 10 amplitude"; without dimensions ""."""
     return " x ".join(f"{size} {dim}" for dim, size in sizes.items())
 
 
 def size_text(size: float) -> str:
-    """Bytes as people write them."""
+    """Return a number of bytes in words, such as "83 MB"."""
     for unit in ("bytes", "kB", "MB", "GB", "TB"):
         if size < 1000.0 or unit == "TB":
             return f"{size:.0f} {unit}" if unit == "bytes" else f"{size:.3g} {unit}"
@@ -38,12 +36,13 @@ def size_text(size: float) -> str:
 
 
 def parse_size(name: str, text: str) -> int:
-    """Return the bytes that a text like "512MiB" or "1.5 GB" means (InputError: none); users know it by its `name`."""
+    """Return the bytes of a text such as "512MiB" or "1.5 GB".
+
+    InputError: it is not such a text; the message calls it `name`.
+    """
     match = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*([kKMGT])(i?)B?\s*", text)
     if match is None:
         raise InputError(f"{name} = {text}: must be a number with a unit, like 512MiB or 2GB")
     number, prefix, binary = match.groups()
-    return int(
-        float(number)
-        * (1024 if binary else 1000) ** ("kMGT".index("k" if prefix in "kK" else prefix) + 1)
-    )
+    power = "KMGT".index(prefix.upper()) + 1
+    return int(float(number) * (1024 if binary else 1000) ** power)

@@ -1,14 +1,16 @@
-"""Kernels: the functions that Python calls, compiled once and kept on disk for the processes that come after.
+"""Kernels: the functions that Python calls, compiled once and kept on disk for later processes.
 
-* Of several processes that need a kernel at once the first compiles it, under its lock; the others load what it keeps.
-* What is kept lies in a folder whose name is a digest of all sources that kernels are made of: a changed equation is
-  never served from an old one.
-* The digests of a kernel's files are written when they are complete, and compared before numba loads them.  Files that
-  a power cut left empty or short, which may crash LLVM, are removed, and the kernel is compiled anew.
-* Machine code is loaded from a folder of this user only, in which nobody else may write.  Where there is none, kernels
-  are compiled in memory, with a warning.
-* Where the folder has no locks, several processes may compile the same kernel.  numba gives each file its name when it
-  is whole, so that the others load all of it.
+* Of several processes that need a kernel at once the first compiles it, under its lock; the others
+  load what it keeps.
+* A kernel is kept in a folder whose name is a digest of all sources that kernels are made of: a
+  changed equation is never served from an old one.
+* The digests of a kernel's files are written when they are complete, and compared before numba
+  loads them.  Files that a power cut left empty or short, which may crash LLVM, are removed, and the
+  kernel is compiled anew.
+* Machine code is loaded from a folder of this user only, in which nobody else may write.  Where
+  there is none, kernels are compiled in memory, with a warning.
+* Where the folder has no locks, several processes may compile the same kernel.  numba gives each
+  file its name when it is whole, so that the others load all of it.
 
 `NUMBA_CACHE_DIR` sets the folder, as it does for numba; `NUMBA_DISABLE_JIT` is honoured.
 """
@@ -49,7 +51,9 @@ _compiling = threading.Lock()
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorates a function that Python calls; what it calls is decorated as `slipsweep.jit.decorators` says.
+    """Decorate a function that Python calls.
+
+    Functions that it calls are decorated as `slipsweep.jit.decorators` says.
 
     It is compiled by `numba.njit` when first called, or loaded from disk, and runs without the GIL.
     Its arguments have the same types in every call.
@@ -74,7 +78,7 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _compiled(function: Callable[..., Any], types: tuple[Any, ...]) -> Any:
-    """Return the machine code of a kernel for arguments of these types, loaded or compiled and kept."""
+    """Return the machine code of a kernel for arguments of these types, loaded or compiled."""
     with warnings.catch_warnings():
         # numba's advice is for us, not for those who run a sweep
         warnings.simplefilter("ignore", numba.NumbaWarning)
@@ -165,7 +169,7 @@ def _noted(folder: Path, name: str) -> bytes:
 
 @functools.cache
 def cache_folder() -> Path:
-    """Folder of the compiled kernels of these sources (OSError: there is none of this user alone)."""
+    """Return the folder of the compiled kernels of these sources; OSError if none is private."""
     cache_dir = numba.config.CACHE_DIR
     try:
         caches = Path(cache_dir) if cache_dir else platformdirs.user_cache_path()

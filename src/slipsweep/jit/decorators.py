@@ -9,18 +9,20 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
 def part(*fastmath: str, **options: Any) -> Callable[[_Function], _Function]:
-    """`numba.njit` with the options that all have: none assumes away NaN and infinity, which are results here.
+    """Return `numba.njit` with the options that all have.
+
+    None of them assumes away NaN and infinity, which are results here.
 
     `forceinline` is always said: numba would take it from the function that is compiled just then,
     and with it hand it on to all that this calls.
     """
-    own = {
+    common = {
         "nogil": True,
         "error_model": "numpy",
         "fastmath": {"contract", *fastmath},
         "forceinline": False,
     }
-    decorate: Callable[[_Function], _Function] = numba.njit(**(own | options))
+    decorate: Callable[[_Function], _Function] = numba.njit(**(common | options))
     return decorate
 
 

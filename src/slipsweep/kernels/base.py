@@ -17,7 +17,7 @@ from slipsweep.jit.elementary import (
     inverse_versine,
     versine,
 )
-from slipsweep.kernels.events import root_of
+from slipsweep.kernels.roots import root_of
 from slipsweep.motion.paths import Curve, Piece
 
 

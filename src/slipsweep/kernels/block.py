@@ -1,4 +1,6 @@
-"""What all kernels share: the definition of a cell, Eqs. 7-11 with what is given in their place, and the flags.
+"""The definition of a cell, Eqs. 7-11 with values given in their place, and the flags.
+
+All kernels share these.
 
 Time enters the motion only through the phase φ = ωt.  The kernels work in phase: rates of velocity
 are accelerations (m/s² a radian), and a velocity V and a displacement W of theirs, both in m/s²,
@@ -13,16 +15,17 @@ import numpy as np
 
 from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.model import equations as eq
+from slipsweep.model.options import Recoupling, Rise
 from slipsweep.model.variables import VALUELESS, Validity
 
-#: How the block's acceleration rises with the base's (the `model` and `rise` options).
-NEWMARK = 0
-MONOTONE = 1
-LITERAL = 2
+#: Rise of the block's acceleration with the base's (the `model` and `rise` options).
+NEWMARK = int(Rise.NEWMARK)
+MONOTONE = int(Rise.MONOTONE)
+LITERAL = int(Rise.LITERAL)
 
-#: How the block recouples (the `recoupling` option).
-EQ12 = 0
-INTEGRATE = 1
+#: Rule by which the block recouples (the `recoupling` option).
+EQ12 = int(Recoupling.EQ12)
+INTEGRATE = int(Recoupling.INTEGRATE)
 
 STATICALLY_UNSTABLE = int(Validity.STATICALLY_UNSTABLE)
 UPLIFT = int(Validity.UPLIFT)
@@ -37,7 +40,7 @@ FRICTION_ESTIMATED = int(Validity.FRICTION_ESTIMATED)
 MAY_NOT_STOP = int(Validity.MAY_NOT_STOP)
 NOT_AT_REST = int(Validity.NOT_AT_REST)
 
-#: Not a flag of results: an event was not found (`events`), and the engine raises an error.
+#: Not a flag of results: a root was not found (`roots`), and the engine raises an error.
 UNSOLVED = 1 << 14
 NO_VALUE = int(VALUELESS) | UNSOLVED
 
@@ -46,7 +49,7 @@ OF_A_VALUE = YIELD_GOVERNS | NOT_RECOUPLED | NEAR_MODE_LIMIT | FRICTION_ESTIMATE
 
 
 class Cell(NamedTuple):
-    """What is given of one cell; NaN stands for "by default" in the last four."""
+    """Parameters of a cell; NaN stands for "by default" in the last four."""
 
     tan_theta: float
     mu_s: float
@@ -58,7 +61,10 @@ class Cell(NamedTuple):
 
 
 class Options(NamedTuple):
-    """What all cells of a grid share: codes of `rise` and `recoupling`, whether the largest V is requested, and g."""
+    """Options that all cells of a grid share; `rise` and `recoupling` are codes.
+
+    `wants_peak` says whether the largest V is requested.
+    """
 
     rise: int
     recoupling: int
@@ -68,7 +74,7 @@ class Options(NamedTuple):
 
 
 class Interface(NamedTuple):
-    """Eqs. 7-11 of a cell, its sliding mode and the validity known before the motion: all that needs no λ."""
+    """Eqs. 7-11 of a cell, its sliding mode and its validity before the motion: all without λ."""
 
     yield_acceleration: float
     limiting_acceleration: float
@@ -80,7 +86,7 @@ class Interface(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """What a kernel finds of a cell: rows of its array of results.
+    """Results of a cell by the exact kernels: rows of their array of results.
 
     A further result is a further field here, filled in by the kernels and named in
     `model.variables`.  Codes and counts are whole numbers; the counts are those of records.
@@ -111,14 +117,14 @@ RESULTS = (
 
 
 @inlined
-def given_or(given: float, estimate: float) -> float:
-    """What is given, or where that is NaN its estimate."""
-    return estimate if math.isnan(given) else given
+def given_or(value: float, estimate: float) -> float:
+    """Return a given value, or where that is NaN its estimate."""
+    return estimate if math.isnan(value) else value
 
 
 @inlined
 def remarks_on(cell: Cell, ratio: float) -> int:
-    """Cautions and notes on a block of the paper's model that slides, with what is known before it does."""
+    """Cautions and notes on a block of the paper's model that slides, known before the motion."""
     near = (ratio >= 0.9) & (ratio <= 1.1)
     estimated = math.isnan(cell.decay_rate) | math.isnan(cell.delta_mu)
     return (NEAR_MODE_LIMIT if near else 0) | (FRICTION_ESTIMATED if estimated else 0)
@@ -186,7 +192,7 @@ def without_estimates(validity: int) -> int:
 
 
 @scalar
-def store(found: Motion, j: int, results: np.ndarray) -> None:
-    """Write what was found of cell j into its column of the results, (fields of `Motion`, cells)."""
-    for row in range(len(found)):
-        results[row, j] = found[row]
+def store(motion: Motion, j: int, results: np.ndarray) -> None:
+    """Write the motion of cell j into its column of the results, (fields of `Motion`, cells)."""
+    for row in range(len(motion)):
+        results[row, j] = motion[row]

@@ -19,12 +19,12 @@ from slipsweep.kernels.eq4 import (
     relative_acceleration_root,
     response,
 )
+from slipsweep.kernels.sampling import GROUND_ACCELERATION, fill_sample, has_sample
 from slipsweep.kernels.slide import (
     MOST_STAGES,
     SLIDES_ON,
     Slide,
     begin_pulse,
-    note_part,
 )
 from slipsweep.kernels.stick_slip import Place, attenuate, inside, next_break
 from slipsweep.motion.paths import Base, Path
@@ -81,15 +81,15 @@ def most_gained(block: Block, base: Base, p: int, start: float, end: float, slid
 
 @scalar
 def follow_eq4(
-    block: Block, base: Base, start: Place, until: Place, slide: Slide, log: np.ndarray
+    block: Block, base: Base, start: Place, until: Place, slide: Slide, samples: np.ndarray
 ) -> None:
-    """Follow Eq. 4 from a place, where V and W are 0, to another one; the log has its parts."""
+    """Follow Eq. 4 from a place, where V and W are 0, to another one."""
     begin_pulse(slide, 0.0)
     slide.kind = SLIDES_ON
     # apart, because over a symmetric cycle they cancel to the last digit
     above = 0.0
     below = 0.0
-    drift = 0.0
+    lag_x = 0.0
     velocity = 0.0
     last = until.piece + 1 if until.piece < base.pieces.size else until.piece
     for p in range(start.piece, last):
@@ -99,7 +99,11 @@ def follow_eq4(
         end = until.tau if p == until.piece else piece.finish
         if not end > begin:
             continue
-        note_part(slide, log, piece, begin, end)
+        began = phase_at(piece, begin)
+        while has_sample(slide, samples, began, phase_at(piece, end)):
+            gained, moved = eq4_gains(block, piece, curve, begin, begin + slide.since, slide)
+            acceleration = response(block, samples[GROUND_ACCELERATION, slide.sampled])
+            fill_sample(slide, samples, acceleration, gained, moved)
         if slide.zero_counts[0] + slide.zero_counts[1] > 0:
             most = velocity + most_gained(block, base, p, begin, end, slide)
             slide.peak = max(most, slide.peak)  # in this order a NaN is kept
@@ -112,25 +116,13 @@ def follow_eq4(
             above += lag.first
         else:
             below += lag.first
-        drift += lag.first_x
-        velocity = block.g * (above - below) + block.tan_theta * drift
+        lag_x += lag.first_x
+        velocity = block.g * (above - below) + block.tan_theta * lag_x
         slide.velocity = velocity
         slide.peak = max(slide.peak, velocity)
 
 
-@scalar
-def half_wave_after(path: Path, k: int) -> int:
-    """Return the first piece after the negative half wave that follows interval k at once.
-
-    A sample of exactly 0 between two negative ones is within the half wave.
-    """
-    p = path.intervals[k].end
-    while p < path.base.pieces.size and path.base.pieces[p].top < 0.0:
-        p += 1
-    return p
-
-
-@scalar
+@single
 def continuous_pulse(
     block: Block,
     path: Path,
@@ -140,7 +132,7 @@ def continuous_pulse(
     next_place: Place,
     velocity: float,
     slide: Slide,
-    log: np.ndarray,
+    samples: np.ndarray,
 ) -> None:
     """Go from Üg = Üy in interval k of a record, entered with a `velocity`, to the next pulse.
 
@@ -149,7 +141,7 @@ def continuous_pulse(
     from there on.  docs/records.md
     """
     count = path.base.pieces.size
-    until = half_wave_after(path, k)
+    until = path.intervals[k].next_end
     place = Place(until, 0.0)
     ends = path.base.pieces[count - 1].end
     if until < count:
@@ -161,7 +153,7 @@ def continuous_pulse(
         if following == k + 1 and path.intervals[following].first == until:
             place = next_place
             ends = begins
-    follow_eq4(block, path.base, start, place, slide, log)
+    follow_eq4(block, path.base, start, place, slide, samples)
     began = phase_at(path.base.pieces[start.piece], start.tau)
     slide.displacement += velocity * (ends - began)
     slide.velocity += velocity
@@ -170,4 +162,4 @@ def continuous_pulse(
     slide.slips = 1.0 if velocity == 0.0 else 0.0
     if begins > ends:
         held = response(block, block.amplitude * path.intervals[k].height)
-        attenuate(held, path.base.pieces[0], ends, begins - ends, slide, log)
+        attenuate(held, ends, begins - ends, slide, samples)

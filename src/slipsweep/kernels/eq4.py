@@ -14,8 +14,8 @@ from typing import NamedTuple
 from slipsweep.jit.decorators import inlined, scalar, single
 from slipsweep.jit.elementary import versine
 from slipsweep.kernels.base import base_acceleration, offset_at
-from slipsweep.kernels.block import Cell, Interface, Options, decay_rate_of
-from slipsweep.kernels.events import root_of
+from slipsweep.kernels.block import LITERAL, Cell, Interface, Options, decay_rate_of
+from slipsweep.kernels.roots import root_of
 from slipsweep.kernels.slide import Slide
 from slipsweep.model import equations as eq
 from slipsweep.model import friction
@@ -108,8 +108,18 @@ def inflection(block: Block) -> float:
 
 @inlined
 def opposite(a: float, b: float) -> bool:
-    """Return whether one is positive and the other negative; their product might underflow."""
+    """Return True if a and b have opposite signs; their product might underflow."""
     return a < 0.0 < b or b < 0.0 < a
+
+
+@inlined
+def follows_eq4(block: Block, held: float, by_eq4: float, slope: float) -> bool:
+    """Return True if b is E on a rise of Üg, and not held: option `rise`.
+
+    Literal: b = E.  Monotone, b = max(b, E): b is E where that exceeds the `held` b, as long as E
+    rises, dE/dx > 0.
+    """
+    return block.rise == LITERAL or (by_eq4 > held and slope > 0.0)
 
 
 # ----------------------------------------------------------------------------------------- roots
@@ -157,23 +167,24 @@ def relative_acceleration_root(block: Block, start: float, end: float) -> float:
 
 
 @scalar
-def stays_below_yield(block: Block, start: float, end: float) -> bool:
-    """Return whether E ≤ Üy from x = `start` ≥ Üy to `end`."""
+def stays_at_yield(block: Block, start: float, end: float) -> bool:
+    """Return True if b, at Üy before, stays there while Üg rises from `start` ≥ Üy to `end`."""
     highest = max(response(block, start), response(block, end))
     bend = min(inflection(block), end)
     if bend > start and slopes(block, start)[1] > 0.0 > slopes(block, bend)[1]:
         turn = eq4_root(block, Quantity.SLOPE, 0.0, start, bend, bend)
         highest = max(highest, response(block, turn))
-    return highest <= block.yield_acceleration
+    return not follows_eq4(block, block.yield_acceleration, highest, math.inf)
 
 
 # ------------------------------------------------------------------------- gains along a piece
 
 
-class Lag(NamedTuple):
-    """∫ (μs − μ) dτ and ∫ |x| (μs − tan θ − μ) dτ, and each with the weight end − τ.
+class LagIntegrals(NamedTuple):
+    """Integrals of the two terms of `equations.lag`, over g and tan θ, and their moments.
 
-    Apart, because over a symmetric cycle the first must cancel to the last digit.
+    ∫ (μs − μ) dτ and ∫ |x| (μs − tan θ − μ) dτ, and each with the weight end − τ.  They stand
+    apart, because over a symmetric cycle the first must cancel to the last digit.
     """
 
     first: float
@@ -183,8 +194,8 @@ class Lag(NamedTuple):
 
 
 @scalar
-def straight_lag(block: Block, x: float, change: float, width: float) -> Lag:
-    """Return `Lag` where |Üg| goes from x along a straight line, by `change`: closed forms.
+def straight_lag_integrals(block: Block, x: float, change: float, width: float) -> LagIntegrals:
+    """Return `LagIntegrals` where |Üg| goes from x along a straight line, by `change`: closed forms.
 
     docs/numerics.md#straight-pieces
     """
@@ -192,7 +203,7 @@ def straight_lag(block: Block, x: float, change: float, width: float) -> Lag:
         x, change, block.mu_s, block.delta_mu, block.decay_rate, block.g
     )
     kept = block.mu_s - block.tan_theta
-    return Lag(
+    return LagIntegrals(
         (block.mu_s - whole) * width,
         (0.5 * block.mu_s - early) * width * width,
         (kept * (x + 0.5 * change) - (x * whole + change * late)) * width,
@@ -201,10 +212,10 @@ def straight_lag(block: Block, x: float, change: float, width: float) -> Lag:
 
 
 @scalar
-def panel_lag(
+def panel_lag_integrals(
     block: Block, piece: Piece, curve: Curve, near: float, until: float, end: float, slide: Slide
-) -> Lag:
-    """Return `Lag` over a panel of the quadrature: 16 nodes of Gauss and Legendre."""
+) -> LagIntegrals:
+    """Return `LagIntegrals` over a panel of the quadrature: 16 nodes of Gauss and Legendre."""
     # loops of their own, and powers one by one, so that LLVM takes nodes together
     x = slide.nodes
     mu = slide.friction
@@ -243,21 +254,21 @@ def panel_lag(
         second += left * rate
         first_x += rate_x
         second_x += left * rate_x
-    return Lag(first, second, first_x, second_x)
+    return LagIntegrals(first, second, first_x, second_x)
 
 
 @scalar
 def lag_integrals(
     block: Block, piece: Piece, curve: Curve, start: float, end: float, slide: Slide
-) -> Lag:
-    """Return `Lag` over a part of a piece; of a curve panel by panel from the larger friction on.
+) -> LagIntegrals:
+    """Return `LagIntegrals` over a part of a piece; of a curve panel by panel from the larger friction on.
 
     docs/numerics.md#curved-pieces
     """
     x_start = abs(base_acceleration(piece, curve, block.amplitude, start))
     x_end = abs(base_acceleration(piece, curve, block.amplitude, end))
     if piece.degree <= 1:
-        return straight_lag(block, x_start, x_end - x_start, end - start)
+        return straight_lag_integrals(block, x_start, x_end - x_start, end - start)
     length = friction.exponential_decay_length(block.decay_rate, block.g)
     e_foldings = abs(x_end - x_start) / length
     near, far = (start, end) if x_start <= x_end else (end, start)
@@ -271,7 +282,7 @@ def lag_integrals(
         if e_foldings > bound:
             x = math.copysign(least + bound * length, piece.top)
             until = offset_at(piece, curve, block.amplitude, x)
-        panel = panel_lag(block, piece, curve, near, until, end, slide)
+        panel = panel_lag_integrals(block, piece, curve, near, until, end, slide)
         first += panel.first
         second += panel.second
         first_x += panel.first_x
@@ -279,7 +290,7 @@ def lag_integrals(
         near = until
         if e_foldings <= bound:
             break
-    return Lag(first, second, first_x, second_x)
+    return LagIntegrals(first, second, first_x, second_x)
 
 
 @single

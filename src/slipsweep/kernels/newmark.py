@@ -21,7 +21,7 @@ from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import scalar
 from slipsweep.kernels.base import moments
 from slipsweep.kernels.block import STATICALLY_UNSTABLE, UNSOLVED, given_or
-from slipsweep.kernels.events import straight_stop
+from slipsweep.kernels.roots import straight_stop
 from slipsweep.model import equations as eq
 from slipsweep.motion.paths import Curve, Path, Piece
 

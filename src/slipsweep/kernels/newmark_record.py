@@ -16,7 +16,6 @@ import numpy as np
 
 from slipsweep.jit.compiling import kernel
 from slipsweep.jit.decorators import scalar
-from slipsweep.kernels.events import straight_stop
 from slipsweep.kernels.newmark import (
     Block,
     add,
@@ -25,6 +24,7 @@ from slipsweep.kernels.newmark import (
     store,
     store_no_value,
 )
+from slipsweep.kernels.roots import straight_stop
 from slipsweep.motion.samples import SPAN, Samples
 
 

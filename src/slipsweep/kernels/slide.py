@@ -1,12 +1,10 @@
-"""The state of a block within a pulse, which the walk changes, and the log of its motion."""
+"""The state of a block within a pulse, which the walk changes."""
 
 from typing import Any, TypeAlias
 
 import numpy as np
 
 from slipsweep.jit.decorators import inlined, scalar
-from slipsweep.kernels.base import phase_at
-from slipsweep.motion.paths import Piece
 from slipsweep.motion.pieces import NODES
 
 #: More stages than any rise has: five places where E, dE/dx or D turn, and a stop and an onset
@@ -31,17 +29,19 @@ SLIDE = np.dtype(
                 # how b goes on (HELD, …), and b: held, or as last taken from Eq. 4
                 ("kind", np.int64),
                 ("held", np.float64),
+                # on a rise of Üg: b is E so far
+                ("follows", np.bool_),
                 ("slides", np.bool_),
                 # if the largest V is requested
                 ("wants_peak", np.bool_),
                 # slides that began from rest
                 ("slips", np.float64),
-                # for the log: how many rows it has; the phase at the beginning of the pulse, and V
-                # and W there that the two above do not have; by how much phases of the path are
-                # less than those of the motion; the friction of the pulse
-                ("logged", np.int64),
-                ("delta_mu", np.float64),
-                ("decay_rate", np.float64),
+                # for the samples of a history: how many are filled, and the phase from the start of a
+                # part to the next; the phase at the beginning of the pulse, and V and W there that
+                # the two above do not have; by how much phases of the path are less than those of
+                # the motion
+                ("sampled", np.int64),
+                ("since", np.float64),
                 ("began", np.float64),
                 ("velocity_before", np.float64),
                 ("displacement_before", np.float64),
@@ -60,28 +60,6 @@ SLIDE = np.dtype(
 
 #: A record of SLIDE.
 Slide: TypeAlias = Any
-
-#: A part of the motion: its kind, the piece, τ and the phase of the path where it starts, the phase
-#: where it ends, how much less these are than those of the motion; b, V and W where it starts, and
-#: the friction of its pulse.
-LOG = np.dtype(
-    (
-        np.record,
-        [
-            ("kind", np.int64),
-            ("piece", np.int64),
-            ("tau", np.float64),
-            ("start", np.float64),
-            ("end", np.float64),
-            ("phases_before", np.float64),
-            ("held", np.float64),
-            ("velocity", np.float64),
-            ("displacement", np.float64),
-            ("delta_mu", np.float64),
-            ("decay_rate", np.float64),
-        ],
-    )
-)
 
 
 @inlined
@@ -104,43 +82,10 @@ def begin_to_slide(slide: Slide, held: float) -> None:
     slide.slips += 1.0
 
 
-@inlined
+@scalar
 def gain(slide: Slide, velocity: float, displacement: float) -> None:
     """Set V at the end of a part of the motion, and add the W gained in it."""
     slide.velocity = velocity
     slide.displacement += displacement
     slide.peak = max(velocity, slide.peak)
     slide.least = min(velocity, slide.least)
-
-
-@scalar
-def note(slide: Slide, log: np.ndarray, piece: Piece, start: float, end: float, tau: float) -> None:
-    """Write a part of the motion into the log: phases at its start and end, τ on its piece.
-
-    A part for which the log has no room is only counted.
-    """
-    slide.logged += 1
-    if slide.logged > log.size:
-        return
-    row = log[slide.logged - 1]
-    row.kind = slide.kind
-    row.piece = piece.number
-    row.tau = tau
-    row.start = start
-    row.end = end
-    row.phases_before = slide.phases_before
-    row.held = slide.held
-    row.velocity = slide.velocity_before + slide.velocity
-    passed = start - slide.began
-    row.displacement = (
-        slide.displacement_before + slide.velocity_before * passed + slide.displacement
-    )
-    row.delta_mu = slide.delta_mu
-    row.decay_rate = slide.decay_rate
-
-
-@inlined
-def note_part(slide: Slide, log: np.ndarray, piece: Piece, start: float, end: float) -> None:
-    """Write a part of the motion along a piece, from τ to τ, into the log, if one is kept."""
-    if log.size:
-        note(slide, log, piece, phase_at(piece, start), phase_at(piece, end), start)

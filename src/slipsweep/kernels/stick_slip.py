@@ -11,19 +11,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from slipsweep.jit.decorators import inlined, scalar, single
+from slipsweep.jit.decorators import scalar, single
 from slipsweep.kernels.base import base_acceleration, held_gains, offset_at, phase_at
 from slipsweep.kernels.block import (
     INTEGRATE,
     KD_NOT_POSITIVE,
-    LITERAL,
-    MONOTONE,
 )
 from slipsweep.kernels.eq4 import (
     Block,
     Quantity,
     eq4_gains,
     eq4_root,
+    follows_eq4,
     inflection,
     opposite,
     relative_acceleration,
@@ -31,7 +30,8 @@ from slipsweep.kernels.eq4 import (
     response,
     slopes,
 )
-from slipsweep.kernels.events import root_of, straight_stop
+from slipsweep.kernels.roots import root_of, straight_stop
+from slipsweep.kernels.sampling import GROUND_ACCELERATION, fill_sample, has_sample
 from slipsweep.kernels.slide import (
     ATTENUATES,
     FOLLOWS_EQ4,
@@ -40,8 +40,6 @@ from slipsweep.kernels.slide import (
     Slide,
     begin_to_slide,
     gain,
-    note,
-    note_part,
 )
 from slipsweep.model import equations as eq
 from slipsweep.motion.paths import Base, Curve, Path, Piece
@@ -64,16 +62,15 @@ class Place(NamedTuple):
 
 @scalar
 def rising_acceleration(block: Block, held: float, x: float) -> float:
-    """Return b of a block that slides, as the base comes to x and does not fall: option `rise`.
+    """Return b of a block that slides, as the base comes to x and does not fall.
 
-    Monotone: b = max(b, E).  Literal: b = E.  At the onset, with Üy for the b before, it is c(x).
+    At the onset, with Üy for the b before, it is the paper's c(x).
     """
-    if block.rise == MONOTONE:
-        return max(held, response(block, x))
-    return response(block, x)
+    by_eq4 = response(block, x)
+    return by_eq4 if follows_eq4(block, held, by_eq4, math.inf) else held
 
 
-@inlined
+@scalar
 def inside(x: float, end: float) -> float:
     """Return a place just beyond x on the way to `end`; at x, perhaps a root, signs are rounding."""
     way = end - x
@@ -126,11 +123,10 @@ class Stage(NamedTuple):
 
 
 @scalar
-def next_stage(block: Block, x: float, top: float, held: float, follows: bool) -> Stage:
-    """Return the next stage of a slide on the rise from x to `top`: option `rise`.
+def next_stage(block: Block, x: float, top: float, slide: Slide) -> Stage:
+    """Return the next stage of a slide on the rise from x to `top`.
 
-    Literal: b follows Eq. 4 throughout.  Monotone, b = max(b, E): b is held until E comes to it,
-    and follows E until that falls.  A stage that follows Eq. 4 ends where D changes its sign, too.
+    b is held until it follows E, and follows until E or D turns.  docs/numerics.md#onset-and-switch
     """
     end = top
     inner = inside(x, end)
@@ -139,7 +135,9 @@ def next_stage(block: Block, x: float, top: float, held: float, follows: bool) -
         end = next_break(block, x, top)
         inner = inside(x, end)
     rate, slope, _ = slopes(block, inner)
-    if block.rise == LITERAL or (slope > 0.0 and (follows or inner - rate >= held)):
+    held = slide.held
+    # a block that has followed E so far has no b that E would have to exceed
+    if follows_eq4(block, -math.inf if slide.follows else held, inner - rate, slope):
         if not bends:
             # E is convex, D concave: it may be positive between two places where it is not
             end = next_break(block, x, top)
@@ -181,7 +179,7 @@ def hold(
     start: float,
     end: float,
     slide: Slide,
-    log: np.ndarray,
+    samples: np.ndarray,
 ) -> float:
     """Slide with b held, dV/dτ = Üg − b, from start to end, or to the stop; return τ there."""
     slide.kind = HELD
@@ -220,7 +218,9 @@ def hold(
                 where = (block, piece, curve, slide, start)
                 end = _stop_root(where, low, high, 0.5 * (low + high), start)
         moved = held_gains(piece, curve, amplitude, held, start, end)[1]
-    note_part(slide, log, piece, start, end)
+    while has_sample(slide, samples, phase_at(piece, start), phase_at(piece, end)):
+        part = held_gains(piece, curve, amplitude, held, start, start + slide.since)
+        fill_sample(slide, samples, held, part[0], part[1])
     slide.slides = not stops
     gain(slide, 0.0 if stops else velocity + gained, velocity * (end - start) + moved)
     return end
@@ -234,7 +234,7 @@ def follow(
     start: float,
     end: float,
     slide: Slide,
-    log: np.ndarray,
+    samples: np.ndarray,
 ) -> float:
     """Slide under Eq. 4, D of one sign, from start to end, or to the stop; return τ there."""
     slide.kind = FOLLOWS_EQ4
@@ -245,7 +245,10 @@ def follow(
         where = (block, piece, curve, slide, start)
         end = _stop_root(where, start, end, 0.5 * (start + end), start)
         moved = eq4_gains(block, piece, curve, start, end, slide)[1]
-    note_part(slide, log, piece, start, end)
+    while has_sample(slide, samples, phase_at(piece, start), phase_at(piece, end)):
+        part = eq4_gains(block, piece, curve, start, start + slide.since, slide)
+        acceleration = response(block, samples[GROUND_ACCELERATION, slide.sampled])
+        fill_sample(slide, samples, acceleration, part[0], part[1])
     slide.slides = not stops
     gain(slide, 0.0 if stops else velocity + gained, velocity * (end - start) + moved)
     return end
@@ -256,13 +259,14 @@ def follow(
 
 @scalar
 def place_of(block: Block, base: Base, x: float, place: Place, last: int) -> Place:
-    """Return where the base comes to x on the rise from a place to the end of piece `last`."""
-    p = place.piece
-    tau = place.tau
-    while p < last and block.amplitude * base.pieces[p].last < x:
+    """Return where Üg comes to x, or jumps past it, from a place to the end of piece `last`."""
+    p, tau = place
+    while p < last and block.amplitude * max(base.pieces[p].first, base.pieces[p].last) <= x:
         p += 1
         tau = base.pieces[p].begin
     piece = base.pieces[p]
+    if block.amplitude * piece.first >= x:
+        return Place(p, tau)
     if block.amplitude * piece.last <= x:
         return Place(p, piece.finish)
     curve = base.curves[piece.curve]
@@ -277,11 +281,11 @@ def rise(
     last: int,
     x: float,
     slide: Slide,
-    log: np.ndarray,
+    samples: np.ndarray,
 ) -> None:
     """Go from a place, where Üg = x, to the top of the rise at the end of piece `last`."""
     top = block.amplitude * base.pieces[last].last
-    follows = block.rise == LITERAL
+    slide.follows = False
     for _ in range(MOST_STAGES * (1 + last - place.piece)):
         if not slide.slides:
             from_yield = max(x, block.yield_acceleration)
@@ -295,9 +299,9 @@ def rise(
             if began <= from_yield:
                 held = min(rising_acceleration(block, block.yield_acceleration, began), began)
             begin_to_slide(slide, held)
-            follows = block.rise == LITERAL
+            slide.follows = False
             x = began
-        stage = next_stage(block, x, top, slide.held, follows)
+        stage = next_stage(block, x, top, slide)
         until = place_of(block, base, stage.end, place, last)
         p, tau = place
         while True:
@@ -305,9 +309,9 @@ def rise(
             curve = base.curves[piece.curve]
             end = until.tau if p == until.piece else piece.finish
             if stage.follows:
-                tau = follow(block, piece, curve, tau, end, slide, log)
+                tau = follow(block, piece, curve, tau, end, slide, samples)
             else:
-                tau = hold(block, piece, curve, tau, end, slide, log)
+                tau = hold(block, piece, curve, tau, end, slide, samples)
             if not slide.slides or p == until.piece:
                 break
             p += 1
@@ -321,22 +325,12 @@ def rise(
             continue
         place = until
         x = stage.end
-        follows = stage.follows_after
+        slide.follows = stage.follows_after
         if stage.follows:
             slide.held = response(block, x)
         if x >= top:
             return
     slide.displacement = math.nan
-
-
-@inlined
-def rises_anew(base: Base, p: int) -> bool:
-    """Return whether piece p, of Üg > 0, jumps upwards, is a plateau, or rises after a fall."""
-    piece = base.pieces[p]
-    if piece.jumps or (piece.first > 0.0 and piece.first == piece.last):
-        return True
-    fell = p > 0 and base.pieces[p - 1].first > base.pieces[p - 1].last
-    return fell and 0.0 < piece.first < piece.last
 
 
 @scalar
@@ -352,7 +346,7 @@ def reset_held(block: Block, piece: Piece, x: float, slide: Slide) -> None:
 
 @scalar
 def attenuate(
-    held: float, piece: Piece, start: float, duration: float, slide: Slide, log: np.ndarray
+    held: float, start: float, duration: float, slide: Slide, samples: np.ndarray
 ) -> None:
     """Take V, of either sign, down by Eq. 12 with Ümax = `held`, from the phase `start` on.
 
@@ -362,13 +356,15 @@ def attenuate(
     speed = abs(slide.velocity)
     slide.kind = ATTENUATES
     slide.held = side * held
-    if log.size:
-        note(slide, log, piece, start, start + min(duration, speed / held), 0.0)
+    while has_sample(slide, samples, start, start + min(duration, speed / held)):
+        acceleration = samples[GROUND_ACCELERATION, slide.sampled] + slide.held
+        gained = -slide.held * slide.since
+        fill_sample(slide, samples, acceleration, gained, 0.5 * gained * slide.since)
     moved = eq.attenuated_displacement(speed, held, duration)
     gain(slide, side * eq.attenuated_velocity(speed, held, duration), side * moved)
 
 
-@scalar
+@single
 def recouple(
     block: Block,
     recoupling: int,
@@ -376,7 +372,7 @@ def recouple(
     t5: int,
     following: Place,
     slide: Slide,
-    log: np.ndarray,
+    samples: np.ndarray,
 ) -> int:
     """Go from Üg = 0, at piece `t5`, to the next pulse or to the stop; return flags.
 
@@ -398,14 +394,14 @@ def recouple(
             end = following.tau if p == following.piece else piece.finish
             if slide.slides and end > piece.begin:
                 curve = base.curves[piece.curve]
-                hold(block, piece, curve, piece.begin, end, slide, log)
+                hold(block, piece, curve, piece.begin, end, slide, samples)
         started = base.pieces[count - 1].end
     if not slide.slides or (recoupling == INTEGRATE and not ends):
         return 0
     duration = math.inf
     if not ends:
         duration = phase_at(base.pieces[following.piece], following.tau) - started
-    attenuate(slide.held, base.pieces[0], started, duration, slide, log)
+    attenuate(slide.held, started, duration, slide, samples)
     return 0
 
 
@@ -421,20 +417,12 @@ def first_pulse(block: Block, path: Path, k: int) -> int:
 
 @scalar
 def beginning(block: Block, path: Path, k: int) -> Place:
-    """Return the place in interval k at which Üg comes to Üy or jumps past it.
-
-    Past the last interval it is past all pieces.
-    """
+    """Return the place in interval k at which Üg comes to Üy; past the last it is past all pieces."""
     if k >= path.intervals.size:
         return Place(path.base.pieces.size, 0.0)
-    p = path.intervals[k].first
-    onset_ = block.yield_acceleration
-    while block.amplitude * max(path.base.pieces[p].first, path.base.pieces[p].last) <= onset_:
-        p += 1
-    piece = path.base.pieces[p]
-    if block.amplitude * piece.first >= onset_:
-        return Place(p, piece.begin)
-    return Place(p, offset_at(piece, path.base.curves[piece.curve], block.amplitude, onset_))
+    interval = path.intervals[k]
+    begin = Place(interval.first, path.base.pieces[interval.first].begin)
+    return place_of(block, path.base, block.yield_acceleration, begin, interval.end - 1)
 
 
 @scalar
@@ -446,7 +434,7 @@ def stick_slip_pulse(
     t5: int,
     following: Place,
     slide: Slide,
-    log: np.ndarray,
+    samples: np.ndarray,
 ) -> int:
     """Go from the place where Üg = Üy to that where the next pulse begins; return flags.
 
@@ -459,29 +447,19 @@ def stick_slip_pulse(
     while p < t5:
         piece = base.pieces[p]
         curve = base.curves[piece.curve]
-        if rises_anew(base, p):
+        if piece.resets_held:
             reset_held(block, piece, x, slide)
         if piece.first < piece.last:
-            last = p
-            while last + 1 < t5 and goes_on_rising(base, last):
-                last += 1
-            rise(block, base, Place(p, tau), last, x, slide, log)
-            p = last
+            rise(block, base, Place(p, tau), piece.rise_end, x, slide, samples)
+            p = piece.rise_end
         elif slide.slides:
-            tau = hold(block, piece, curve, tau, piece.finish, slide, log)
+            tau = hold(block, piece, curve, tau, piece.finish, slide, samples)
             if not slide.slides and piece.first == piece.last:  # a plateau: at once anew
                 reset_held(block, piece, x, slide)
                 if slide.slides:
-                    hold(block, piece, curve, tau, piece.finish, slide, log)
+                    hold(block, piece, curve, tau, piece.finish, slide, samples)
         p += 1
         if p < t5:
             x = block.amplitude * base.pieces[p].first
             tau = base.pieces[p].begin
-    return recouple(block, recoupling, base, t5, following, slide, log)
-
-
-@inlined
-def goes_on_rising(base: Base, p: int) -> bool:
-    """Return whether the piece after piece p, which rises, goes on from its end and rises, too."""
-    after = base.pieces[p + 1]
-    return base.pieces[p].last == after.first < after.last
+    return recouple(block, recoupling, base, t5, following, slide, samples)

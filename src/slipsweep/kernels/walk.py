@@ -1,8 +1,8 @@
 """The exact walk of the paper's law: a cell from pulse to pulse, under a wave or a record.
 
-One kernel, compiled once: a sweep takes the results at the end of the walk, a time history is a log
-of it (`slipsweep.kernels.history`).  Cycles of a wave that are alike are not gone through one by
-one (docs/numerics.md#trains-of-pulses); a log has them all.
+One kernel, compiled once: a sweep takes the results at the end of the walk, a time history the
+samples that it passes (`slipsweep.kernels.sampling`).  Cycles of a wave that are alike are not gone
+through one by one (docs/numerics.md#trains-of-pulses), but for samples.
 """
 
 import math
@@ -18,7 +18,6 @@ from slipsweep.kernels.block import (
     FRICTION_ESTIMATED,
     FRICTION_NOT_DECAYING,
     LIMIT_UNDEFINED,
-    MONOTONE,
     NEAR_MODE_LIMIT,
     NO_VALUE,
     NOT_RECOUPLED,
@@ -36,9 +35,9 @@ from slipsweep.kernels.block import (
     store,
 )
 from slipsweep.kernels.continuous import continuous_pulse, find_velocity_extremes, follow_eq4
-from slipsweep.kernels.eq4 import Block, block_of, stays_below_yield
+from slipsweep.kernels.eq4 import Block, block_of, stays_at_yield
 from slipsweep.kernels.grid import cell_at
-from slipsweep.kernels.slide import LOG, SLIDE, Slide, begin_pulse
+from slipsweep.kernels.slide import SLIDE, Slide, begin_pulse
 from slipsweep.kernels.stick_slip import Place, beginning, first_pulse, stick_slip_pulse
 from slipsweep.model import equations as eq
 from slipsweep.motion.paths import Path
@@ -58,9 +57,8 @@ WALK = np.dtype(
                 ("slips", np.float64),
                 ("stick_slip_pulses", np.float64),
                 ("continuous_pulses", np.float64),
-                # the interval of the next pulse, and the phase of the motion at which it begins
+                # the interval of the next pulse
                 ("interval", np.int64),
-                ("until", np.float64),
                 # plain cycles that are left, and the interval of their first pulse
                 ("left", np.int64),
                 ("first", np.int64),
@@ -76,8 +74,6 @@ WALK = np.dtype(
                 ("seen_at", np.int64),
                 ("next_look", np.int64),
                 ("done", np.int64),
-                ("begun", np.bool_),
-                ("ended", np.bool_),
             ],
             align=True,
         ),
@@ -99,7 +95,7 @@ def begin(walk: Walk, path: Path) -> None:
     walk.slips = 0.0
     walk.stick_slip_pulses = 0.0
     walk.continuous_pulses = 0.0
-    walk.interval = -1
+    walk.interval = 0
     walk.left = path.repeats
     walk.first = -1
     walk.seen_velocity = 0.0
@@ -107,8 +103,6 @@ def begin(walk: Walk, path: Path) -> None:
     walk.seen_at = 0
     walk.next_look = 1
     walk.done = 0
-    walk.begun = True
-    walk.ended = False
 
 
 @scalar
@@ -146,8 +140,7 @@ def flags_of_pulse(
     """Return the flags of a pulse of a record, with that peak."""
     flags = remarks_on(cell, interface.acceleration_ratio)
     flags |= interface.validity & FRICTION_NOT_DECAYING
-    monotone = block.rise == MONOTONE and not continuous
-    if monotone and stays_below_yield(block, block.yield_acceleration, peak):
+    if not continuous and stays_at_yield(block, block.yield_acceleration, peak):
         flags = YIELD_GOVERNS | (flags & ~FRICTION_ESTIMATED)
     return flags
 
@@ -160,22 +153,13 @@ def cycles_before(path: Path, walk: Walk) -> int:
 
 
 @scalar
-def prepare_log(
-    walk: Walk,
-    path: Path,
-    block: Block,
-    place: Place,
-    velocity: float,
-    slide: Slide,
-) -> None:
-    """Set what the log says of all parts of a pulse: a `velocity` besides that of the slide."""
+def prepare_samples(walk: Walk, path: Path, place: Place, velocity: float, slide: Slide) -> None:
+    """Set what samples of a history in a pulse have besides the slide, as `velocity`."""
     piece = path.base.pieces[place.piece]
     slide.began = phase_at(piece, place.tau)
     slide.velocity_before = velocity
     slide.displacement_before = walk.displacement
     slide.phases_before = 2.0 * math.pi * cycles_before(path, walk)
-    slide.delta_mu = block.delta_mu
-    slide.decay_rate = block.decay_rate
 
 
 @scalar
@@ -259,9 +243,9 @@ def walk_pulses(
     path: Path,
     walk: Walk,
     slide: Slide,
-    log: np.ndarray,
+    samples: np.ndarray,
 ) -> None:
-    """Go from pulse to pulse, until the motion ends or the log is full.
+    """Go from pulse to pulse.
 
     Under a wave the pulses of the plain cycle come again and again; of a record each has the
     friction of its own peak, and may be one of continuous sliding.
@@ -269,9 +253,10 @@ def walk_pulses(
     plain = path.cycles[path.lead].first
     plain_end = path.cycles[path.lead + 1].first if path.repeats > 0 else plain
     continuous = False
-    if walk.interval < 0:
-        walk.interval = first_pulse(block, path, walk.interval + 1)
+    walk.interval = first_pulse(block, path, walk.interval)
     while walk.interval < path.intervals.size and walk.validity & NO_VALUE == 0:
+        if samples.size and slide.sampled == samples.shape[1]:
+            break
         k = walk.interval
         interval = path.intervals[k]
         repeats = walk.left > 0 and plain <= interval.first < plain_end
@@ -290,39 +275,34 @@ def walk_pulses(
         start = beginning(block, path, k)
         following = first_pulse(block, path, k + 1)
         ends = beginning(block, path, following)
-        logged = slide.logged
-        if log.size:
+        if samples.size:
             velocity = walk.velocity if continuous else 0.0
-            prepare_log(walk, path, block, start, velocity, slide)
+            prepare_samples(walk, path, start, velocity, slide)
         flags = 0
         if continuous:
             find_velocity_extremes(block, options.wants_peak, path, slide)
-            continuous_pulse(block, path, k, start, following, ends, walk.velocity, slide, log)
+            continuous_pulse(block, path, k, start, following, ends, walk.velocity, slide, samples)
         else:
             # v never goes below 0: a velocity upslope, left by a continuous pulse, is neglected
             begin_pulse(slide, max(walk.velocity, 0.0))
             recoupling = options.recoupling
             flags = stick_slip_pulse(
-                block, recoupling, path.base, start, interval.end, ends, slide, log
+                block, recoupling, path.base, start, interval.end, ends, slide, samples
             )
             slides_on = slide.velocity > 0.0 and flags == 0 and following < path.intervals.size
             if slides_on:
                 flags = NOT_RECOUPLED
-        if log.size and slide.logged > log.size:
-            slide.logged = logged
-            return
         walk.validity |= flags
         add_pulse(walk, slide, continuous)
         walk.interval = following
         last = following == path.intervals.size or path.intervals[following].first >= plain_end
         if repeats and last:
             walk.left -= 1
-            if log.size == 0:
+            if samples.size == 0:
                 pass_over_cycles(options, path, walk)
                 walk.interval = first_pulse(block, path, walk.interval)
             if walk.left > 0:
                 walk.interval = walk.first
-    walk.ended = True
 
 
 # ---------------------------------------------------------------------------- continuous sliding
@@ -330,75 +310,61 @@ def walk_pulses(
 
 @single
 def slide_through_cycles(
-    block: Block, options: Options, path: Path, walk: Walk, slide: Slide, log: np.ndarray
+    block: Block, options: Options, path: Path, walk: Walk, slide: Slide, samples: np.ndarray
 ) -> None:
     """Slide continuously from the first Üg ≥ Üy to the end of a wave.
 
-    Cycles of one shape, one after the other, are a series; in a log each has its own parts.
+    Cycles of one shape, one after the other, are a series; for samples each is gone through.
     docs/numerics.md#continuous-sliding
     """
-    start = beginning(block, path, first_pulse(block, path, walk.interval + 1))
+    start = beginning(block, path, first_pulse(block, path, walk.interval))
     find_velocity_extremes(block, options.wants_peak, path, slide)
     shape = -1  # of the cycle whose gains are in `walk.gained` and the two that follow
     cycle_velocity = 0.0
     while walk.done < options.cycles:
+        if samples.size and slide.sampled == samples.shape[1]:
+            break
         c = walk.done - cycles_before(path, walk)
         place = Place(path.cycles[c].first, path.base.pieces[path.cycles[c].first].begin)
         end = Place(path.cycles[c + 1].first, -math.inf)
         alike = 1
         if walk.slips == 0.0:
-            if end.piece <= start.piece:
-                pass_cycles(path, walk, c, 1)
-                continue
             place = start
-        elif log.size == 0 and walk.left > 0 and c == path.lead:
+        elif samples.size == 0 and walk.left > 0 and c == path.lead:
             alike = walk.left
-        if place.piece == start.piece or path.cycles[c].shape != shape or log.size:
-            logged = slide.logged
-            if log.size:
-                prepare_log(walk, path, block, place, walk.velocity, slide)
-            follow_eq4(block, path.base, place, end, slide, log)
-            if log.size and slide.logged > log.size:
-                slide.logged = logged
-                return
+        slides = end.piece > start.piece
+        new = place.piece == start.piece or path.cycles[c].shape != shape
+        if slides and (new or samples.size):
+            if samples.size:
+                prepare_samples(walk, path, place, walk.velocity, slide)
+            follow_eq4(block, path.base, place, end, slide, samples)
             shape = path.cycles[c].shape if walk.slips > 0.0 else -1
             cycle_velocity = slide.velocity
             walk.gained = slide.displacement
             walk.highest = slide.peak
-        walk.slips = 1.0
-        later = alike - 1.0
-        fastest = max(walk.velocity, walk.velocity + later * cycle_velocity)
-        walk.peak = max(fastest + walk.highest, walk.peak)
-        series = math.pi * (2.0 * walk.velocity + cycle_velocity * later)
-        add(walk, alike * (walk.gained + series))
-        walk.velocity += alike * cycle_velocity
-        pass_cycles(path, walk, c, alike)
-    walk.ended = True
-
-
-@inlined
-def pass_cycles(path: Path, walk: Walk, c: int, count: int) -> None:
-    """Count cycles that have passed, of which the first is cycle c of the path."""
-    walk.done += count
-    if c == path.lead and walk.left > 0:
-        walk.left -= count
+        if slides:
+            walk.slips = 1.0
+            later = alike - 1.0
+            fastest = max(walk.velocity, walk.velocity + later * cycle_velocity)
+            walk.peak = max(fastest + walk.highest, walk.peak)
+            series = math.pi * (2.0 * walk.velocity + cycle_velocity * later)
+            add(walk, alike * (walk.gained + series))
+            walk.velocity += alike * cycle_velocity
+        walk.done += alike
+        if c == path.lead and walk.left > 0:
+            walk.left -= alike
 
 
 # ---------------------------------------------------------------------------------------- a cell
 
 
-@scalar
+@single
 def yield_governs(block: Block, path: Path) -> bool:
-    """Return whether b = Üy throughout: E is nowhere above Üy where the base rises or jumps to.
-
-    Only with the monotone rise: with the literal one b follows Eq. 4 below Üy, too.
-    """
-    if block.rise != MONOTONE:
-        return False
+    """Return True if b = Üy throughout: E is nowhere above Üy where the base rises or jumps to."""
     for i in range(path.rises.shape[0]):
         low = max(block.amplitude * path.rises[i, 0], block.yield_acceleration)
         high = block.amplitude * path.rises[i, 1]
-        if high > block.yield_acceleration and not stays_below_yield(block, low, high):
+        if high > block.yield_acceleration and not stays_at_yield(block, low, high):
             return False
     return True
 
@@ -422,19 +388,6 @@ def validity_before(
 
 
 @scalar
-def set_next_phase(block: Block, path: Path, series: bool, walk: Walk) -> None:
-    """Set the phase of the motion up to which the log goes."""
-    walk.until = math.inf
-    if walk.ended:
-        return
-    walk.until = 2.0 * math.pi * walk.done
-    if not series:
-        place = beginning(block, path, walk.interval)
-        walk.until = phase_at(path.base.pieces[place.piece], place.tau)
-        walk.until += 2.0 * math.pi * cycles_before(path, walk)
-
-
-@scalar
 def motion_of(cell: Cell, path: Path, mode: int, walk: Walk) -> Motion:
     """Return the results of a walk; a record has no mode, but counts of pulses, a wave no counts."""
     largest = cell.amplitude
@@ -442,21 +395,20 @@ def motion_of(cell: Cell, path: Path, mode: int, walk: Walk) -> Motion:
         largest *= max(path.highest, -path.lowest)
     validity = settled(walk.validity, walk.displacement, largest)
     if validity & NO_VALUE != 0:
-        no_mode = math.nan if path.recorded else -1.0
-        no_count = -1.0 if path.recorded else math.nan
-        return Motion(math.nan, math.nan, no_mode, float(validity), no_count, no_count, no_count)
-    if path.recorded:
-        return Motion(
-            walk.displacement,
-            walk.peak,
-            math.nan,
-            float(validity),
-            walk.slips,
-            walk.stick_slip_pulses,
-            walk.continuous_pulses,
-        )
+        walk.displacement = math.nan
+        walk.peak = math.nan
+        walk.slips = -1.0
+        walk.stick_slip_pulses = -1.0
+        walk.continuous_pulses = -1.0
+        mode = -1
     return Motion(
-        walk.displacement, walk.peak, float(mode), float(validity), math.nan, math.nan, math.nan
+        walk.displacement,
+        walk.peak,
+        math.nan if path.recorded else float(mode),
+        float(validity),
+        walk.slips if path.recorded else math.nan,
+        walk.stick_slip_pulses if path.recorded else math.nan,
+        walk.continuous_pulses if path.recorded else math.nan,
     )
 
 
@@ -467,13 +419,12 @@ def solve_walk(
     path: Path,
     walks: np.ndarray,
     slides: np.ndarray,
-    log: np.ndarray,
+    samples: np.ndarray,
     results: np.ndarray,
 ) -> None:
     """Solve the cells of a tile exactly; `results` is (fields of `Motion`, cells).
 
-    The other arrays are those of `workspace_of`.  With a log the walk of a single cell goes on from
-    where the call before has left it, until `walks` says that it has ended.
+    The other arrays are those of `workspace_of`; samples are of a single cell.
     """
     walk = walks[0]
     slide = slides[0]
@@ -485,21 +436,19 @@ def solve_walk(
         )
         mode = interface.sliding_mode
         series = mode == eq.CONTINUOUS and not path.recorded
-        if log.size == 0 or not walk.begun:
-            begin(walk, path)
-            walk.validity = validity_before(cell, block, interface, options, path)
-        slide.logged = 0
+        begin(walk, path)
+        walk.validity = validity_before(cell, block, interface, options, path)
+        slide.sampled = 0
         slide.wants_peak = options.wants_peak
         if walk.validity & NO_VALUE or highest <= block.yield_acceleration:
-            walk.ended = True
+            pass
         elif series:
-            slide_through_cycles(block, options, path, walk, slide, log)
+            slide_through_cycles(block, options, path, walk, slide, samples)
         else:
-            walk_pulses(cell, block, options, path, walk, slide, log)
-        set_next_phase(block, path, series, walk)
+            walk_pulses(cell, block, options, path, walk, slide, samples)
         store(motion_of(cell, path, mode, walk), j, results)
 
 
-def workspace_of(rows: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return what `solve_walk` writes into: the walk, the slide, and a log of so many rows."""
-    return np.zeros(1, WALK), np.zeros(1, SLIDE), np.zeros(rows, LOG)
+def workspace_of(count: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return what `solve_walk` writes into: the walk, the slide, and so many samples."""
+    return np.zeros(1, WALK), np.zeros(1, SLIDE), np.zeros((5, count))

@@ -1,4 +1,4 @@
-"""What a user may choose, declared once: a class a choice, a field an option.
+"""Choices of a user (models, waveforms, solvers): a class for each, with a field for each option.
 
 From these declarations come Python's arguments (`model=Mendez(rise="literal")`), the keys of a
 sweep file's table (`rise = "literal"`), the options of the command line (`--rise literal`), and the
@@ -30,9 +30,10 @@ from slipsweep.model.parameters import check_choice, shown
 def option(
     about: str, default: Any = dataclasses.MISSING, *, least: int = 0, most: int | None = None
 ) -> Any:
-    """A field of a `Choice`, with one line on what it is about.
+    """Declare a field of a `Choice`, with one line of text about it.
 
-    A whole number is `least` to `most`; another is within the bounds of the parameter of its name.
+    A whole number is from `least` to `most`.  Another number is within the bounds of its name in
+    `parameters.BOUNDS`.
     """
     return dataclasses.field(
         default=default, metadata={"about": about, "least": least, "most": most}
@@ -41,25 +42,27 @@ def option(
 
 @dataclass(frozen=True)
 class Option:
-    """An option as its class declares it."""
+    """An option, as the class of its choice declares it."""
 
     name: str
-    default: Any  # dataclasses.MISSING where it must be given
-    kind: type  # str, int or float; of one entry, where it is a list
-    words: tuple[str, ...]  # what a word may be; empty for numbers
+    default: Any  # dataclasses.MISSING if it must be given
+    kind: type  # str, int or float; of a list the type of its entries
+    words: tuple[str, ...]  # the words that are allowed; empty for numbers
     is_list: bool
     about: str
     least: int
     most: int | None
 
     def checked(self, value: Any) -> Any:
-        """The value, in the option's own type (InputError: what is allowed)."""
+        """Return the value in the type of the option (InputError: it is not allowed)."""
         if value is None and self.default is None:
             return None
         if not self.is_list:
             return self._single(self.name, value)
         numbers = parameters.check_list(self.name, value, "numbers")
-        return tuple(self._single(f"{self.name}[{at}]", one) for at, one in enumerate(numbers))
+        return tuple(
+            self._single(f"{self.name}[{at}]", number) for at, number in enumerate(numbers)
+        )
 
     def _single(self, name: str, value: Any) -> Any:
         if self.words:
@@ -73,28 +76,29 @@ class Option:
 
 @dataclass(frozen=True)
 class Choice:
-    """One of several ways, with its options; frozen, comparable, and checked when it is made."""
+    """A model, an excitation or a solver, with its options; frozen, and checked when it is made."""
 
-    #: What names the choice where no object can: in strings, sweep files, commands, attributes.
+    #: Name of the choice in strings, sweep files, commands and attributes.
     name: ClassVar[str]
 
     def __post_init__(self) -> None:
-        for one in declared(type(self)):
-            object.__setattr__(self, one.name, one.checked(getattr(self, one.name)))
+        for declaration in declared(type(self)):
+            value = declaration.checked(getattr(self, declaration.name))
+            object.__setattr__(self, declaration.name, value)
         self.check()
 
     def check(self) -> None:
-        """Refuse what one option cannot know of another."""
+        """Raise InputError if options do not go together, or one needs a further check."""
 
     @property
     def options(self) -> dict[str, Any]:
         """The options by name, but for those that are None."""
-        values = {one.name: getattr(self, one.name) for one in dataclasses.fields(self)}
+        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         return {name: value for name, value in values.items() if value is not None}
 
 
 def _declared(choice: Any) -> tuple[Option, ...]:
-    found = []
+    options = []
     hints = get_type_hints(choice)
     for field in dataclasses.fields(choice):
         hint = hints[field.name]
@@ -103,101 +107,114 @@ def _declared(choice: Any) -> tuple[Option, ...]:
         is_list = get_origin(hint) is Sequence
         kind = get_args(hint)[0] if is_list else hint
         words = get_args(kind) if get_origin(kind) is Literal else ()
-        found.append(
+        options.append(
             Option(
                 field.name, field.default, str if words else kind, words, is_list, **field.metadata
             )
         )
-    return tuple(found)
+    return tuple(options)
 
 
-#: The options of a class of choices, in the order of its fields; every object made asks for them,
-#: and hints take long.
+#: The options of a class of choices, in the order of its fields.  Cached: every new object needs
+#: them, and `get_type_hints` is slow.
 declared: Callable[[Any], tuple[Option, ...]] = functools.cache(_declared)
 
-Some = TypeVar("Some", bound=Choice)
+ChoiceType = TypeVar("ChoiceType", bound=Choice)
 
 
 @dataclass(frozen=True)
-class Family(Generic[Some]):
-    """Choices of which one is taken."""
+class Family(Generic[ChoiceType]):
+    """The choices for one argument, such as all models."""
 
-    keyword: str  # Python's argument, and the table of a sweep file
-    key: str  # what names the choice in that table
-    choices: tuple[type[Some], ...]
+    keyword: str  # the argument in Python, and the table of a sweep file
+    key: str  # the key that names the choice in that table
+    choices: tuple[type[ChoiceType], ...]
     default: str
-    attribute: str  # what names the choice in the attributes of a result, and on the command line
+    attribute: str  # the attribute of a result, and the option of the command line, that name it
     aliases: Mapping[str, str] = dataclasses.field(default_factory=dict)  # other names of choices
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All names that a choice may be called by."""
+        """Names of the choices, aliases first."""
         return (*self.aliases, *(choice.name for choice in self.choices))
 
     @property
     def options(self) -> dict[str, Option]:
         """The options of all choices, by name."""
-        return {one.name: one for choice in self.choices for one in declared(choice)}
+        return {option.name: option for choice in self.choices for option in declared(choice)}
 
-    def called(self, name: str) -> type[Some]:
-        """The class of a choice, by name."""
+    def called(self, name: str) -> type[ChoiceType]:
+        """Return the class of a choice, by name."""
         return {choice.name: choice for choice in self.choices}[self.aliases.get(name, name)]
 
     def having(self, name: str) -> list[str]:
-        """Names of the choices that have an option."""
+        """Return the names of the choices that have the option `name`."""
         return [
-            choice.name for choice in self.choices if name in {one.name for one in declared(choice)}
+            choice.name
+            for choice in self.choices
+            if name in {option.name for option in declared(choice)}
         ]
 
-    def of(self, given: Any) -> Some:
-        """The choice that a caller gives: an object, or the name of one with its defaults."""
-        if isinstance(given, self.choices):
-            return given
-        if isinstance(given, str) and given in self.names:
-            return self.made(given, {})
+    def of(self, choice: Any) -> ChoiceType:
+        """Return a choice from an object, or from a name: then with the default options."""
+        if isinstance(choice, self.choices):
+            return choice
+        if isinstance(choice, str) and choice in self.names:
+            return self.made(choice, {})
         names = map(repr, self.names)
-        objects = (f"{choice.__name__}(...)" for choice in self.choices)
+        objects = (f"{class_.__name__}(...)" for class_ in self.choices)
         allowed = f"{', '.join(names)}, or {', '.join(objects)}"
-        raise InputError(f"{self.keyword} = {shown(given)}: must be one of {allowed}")
+        raise InputError(f"{self.keyword} = {shown(choice)}: must be one of {allowed}")
 
-    def made(self, name: Any, options: Mapping[str, Any], key: Callable[[str], str] = str) -> Some:
-        """The choice of a name, with options as a table or a command gives them.
+    def made(
+        self, name: Any, options: Mapping[str, Any], key: Callable[[str], str] = str
+    ) -> ChoiceType:
+        """Return the choice of a name, with options from a sweep file's table or a command.
 
-        `key` is what an option's name is called there, in errors.
+        `key` turns the name of an option into the name that errors use.
         """
         choice = self.called(check_choice(key(self.key), name, self.names))
-        known = {one.name: one for one in declared(choice)}
-        for unknown in (one for one in options if one not in known):
-            if unknown not in self.options:
-                raise InputError(f"{key(unknown)}: unknown; {did_you_mean(unknown, tuple(known))}")
-            allowed = ", ".join(map(repr, self.having(unknown)))
+        allowed_options = {option.name: option for option in declared(choice)}
+        for option_name in options:
+            if option_name in allowed_options:
+                continue
+            if option_name not in self.options:
+                hint = did_you_mean(option_name, tuple(allowed_options))
+                raise InputError(f"{key(option_name)}: unknown; {hint}")
+            others = ", ".join(map(repr, self.having(option_name)))
             raise InputError(
-                f"{key(unknown)}: not allowed with {key(self.key)} = {name!r}, only with {allowed}"
+                f"{key(option_name)}: not allowed with {key(self.key)} = {name!r}, "
+                f"only with {others}"
             )
-        for one in known.values():
-            if one.default is dataclasses.MISSING and one.name not in options:
-                raise InputError(f"{key(one.name)}: must be given with {key(self.key)} = {name!r}")
+        for option_name, option in allowed_options.items():
+            if option.default is dataclasses.MISSING and option_name not in options:
+                raise InputError(
+                    f"{key(option_name)}: must be given with {key(self.key)} = {name!r}"
+                )
         try:
             return choice(**options)
         except InputError as error:
-            text = str(error)  # it begins with the option's name
-            raise InputError(key(text) if text.startswith(tuple(known)) else text) from None
+            text = str(error)  # it begins with the name of the option
+            is_of_option = text.startswith(tuple(allowed_options))
+            raise InputError(key(text) if is_of_option else text) from None
 
-    def attributes(self, choice: Some) -> dict[str, Any]:
-        """What results say of a choice; `from_attributes` gives it again."""
+    def attributes(self, choice: ChoiceType) -> dict[str, Any]:
+        """Return the attributes of results for a choice; `from_attributes` is the inverse."""
         return {self.attribute: choice.name} | choice.options
 
-    def from_attributes(self, attributes: Mapping[str, Any]) -> Some:
-        """The choice that the attributes of a result tell of (InputError: they tell of none)."""
+    def from_attributes(self, attributes: Mapping[str, Any]) -> ChoiceType:
+        """Return the choice that the attributes of a result name (InputError: they name none)."""
         if self.attribute not in attributes:
             raise InputError(f"attribute {self.attribute!r}: missing")
         choice = self.called(
             check_choice(f"attribute {self.attribute}", attributes[self.attribute], self.names)
         )
         options = {
-            one.name: attributes[one.name] for one in declared(choice) if one.name in attributes
+            option.name: attributes[option.name]
+            for option in declared(choice)
+            if option.name in attributes
         }
-        for name in options:  # files give a list of one number as a number
+        for name in options:  # files store a list of one number as a number
             if self.options[name].is_list and not isinstance(options[name], Sequence):
                 options[name] = getattr(options[name], "flat", [options[name]])
         return self.made(choice.name, options, lambda text: f"attribute {text}")

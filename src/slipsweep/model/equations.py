@@ -1,8 +1,8 @@
 """The equations of Mendez, Romo and Botero (2012), one small function each.
 
 Scalars in, a scalar out, SI units, angles already as tangents; the equation number of the paper
-stands in each docstring.  The kernels call these functions as they are, so that what is written
-here is what is computed.  The operators of the printed equations were recovered from the paper's
+stands in each docstring.  The kernels call these functions, so that the formulas written here are
+those that are computed.  The operators of the printed equations were recovered from the paper's
 Table 1 (docs/tutorial.md, "Against the paper").
 """
 
@@ -47,7 +47,7 @@ def mobilised_friction(
 def lag(
     ground_acceleration: float, friction: float, mu_s: float, tan_theta: float, g: float
 ) -> float:
-    """Eq. 4 as what the block falls short of the base's acceleration, |Üg| − |Ü|, m/s².
+    """Eq. 4 as the lag of the block behind the base, |Üg| − |Ü|, m/s².
 
     n (μs − tan θ − μ) + g tan θ is written g (μs − μ) + Üg tan θ (μs − tan θ − μ): near static
     failure Üg is small against g tan θ, which would take its digits
@@ -122,7 +122,10 @@ def block_acceleration(
 def friction_coefficient(
     ground_acceleration: float, mu_s: float, delta_mu: float, decay_rate: float, g: float
 ) -> float:
-    """Eq. 6: friction that decays with the loading rate from μs + Δμ; with Δμ = 0 the original law, Eq. 5."""
+    """Eq. 6: friction that decays with the loading rate from μs + Δμ.
+
+    With Δμ = 0 it is the original law, Eq. 5.
+    """
     return (mu_s + delta_mu) * exp(-decay_rate * abs(ground_acceleration) / g)
 
 
@@ -169,7 +172,10 @@ def decay_rate(
 
 @equation
 def attenuated_velocity(velocity: float, peak_block_acceleration: float, duration: float) -> float:
-    """Eq. 12: relative velocity after `duration`, with g Kd = Ümax, not below zero; the rate is constant: one step."""
+    """Eq. 12: relative velocity after `duration`, with g Kd = Ümax, not below zero.
+
+    The rate is constant, so that one step is exact for any duration.
+    """
     return max(velocity - peak_block_acceleration * duration, 0.0)
 
 
@@ -187,6 +193,6 @@ def attenuated_displacement(
 
 @equation
 def sliding_mode(amplitude: float, yield_acceleration: float, limiting_acceleration: float) -> int:
-    """Mode of the motion: stuck up to the yield acceleration, continuous beyond Eq. 7, else stick-slip."""
+    """Sliding mode: stuck up to the yield value, continuous above Eq. 7, else stick-slip."""
     slides = CONTINUOUS if amplitude > limiting_acceleration else STICK_SLIP
     return STUCK if amplitude <= yield_acceleration else slides

@@ -1,4 +1,4 @@
-"""What the exact kernels need of Eq. 6 besides its value: derivatives, places and integrals.
+"""Derivatives, places and integrals of Eq. 6, which the exact kernels need besides its value.
 
 The stepping kernel (`kernels.step`) takes any law μ(Üg, v) and needs none of these.
 """
@@ -21,7 +21,9 @@ def exponential_derivatives(friction: float, decay_rate: float, g: float) -> tup
 
 @registered
 def exponential_inflection(tan_theta: float, decay_rate: float, g: float) -> float:
-    """Where d²Ü/dÜg² of Eqs. 4 and 6 turns positive: (2 tan θ / λ − 1) g / tan θ; not positive where λ ≥ 2 tan θ.
+    """Üg at which d²Ü/dÜg² of Eqs. 4 and 6 turns positive, (2 tan θ / λ − 1) g / tan θ.
+
+    It is not positive where λ ≥ 2 tan θ.
 
     docs/numerics.md#slope-and-inflection
     """
@@ -42,8 +44,8 @@ def exponential_decay_length(decay_rate: float, g: float) -> float:
     return g / decay_rate
 
 
-#: From here on the moments' closed forms lose less than a digit; below, φ₃'s power series Σ (−z)^k
-#: / (k + 3)! is summed.  From `_DECAYED` on e^(−z) is 0.
+#: From this z on the closed forms of the moments lose less than a digit.  Below it φ₃ is summed as
+#: its power series, Σ (−z)^k / (k + 3)!.  From `_DECAYED` on e^(−z) is 0.
 _SERIES_END = 2.0
 _DECAYED = 708.0
 _SERIES = np.array([1.0 / math.factorial(k + 3) for k in range(21)])
@@ -54,7 +56,8 @@ def moments_of_decay(z: float) -> tuple[float, float, float, float]:
     """∫ e^(−zw) times 1, 1 − w, w and w (1 − w) over w from 0 to 1, for z ≥ 0.
 
     The first two are φ₁ and φ₂ of exponential integrators at −z, and all follow from φ₃.  Below z =
-    2 that is summed, and φₙ = 1/n! − z φₙ₊₁; beyond by the closed forms, which cancel at small z.
+    2 φ₃ is summed, and φₙ = 1/n! − z φₙ₊₁.  Above it the closed forms are used, which cancel at
+    small z.
     """
     if z < _SERIES_END:
         third = 0.0
@@ -74,10 +77,10 @@ def moments_of_decay(z: float) -> tuple[float, float, float, float]:
 def exponential_moments(
     start: float, change: float, mu_s: float, delta_mu: float, decay_rate: float, g: float
 ) -> tuple[float, float, float, float]:
-    """Moments of Eq. 6 along a straight line of |Üg| from `start` by `change` (docs/numerics.md#straight-pieces).
+    """Moments of Eq. 6 along a straight line of |Üg|, from `start` by `change`.
 
-    The exponential is taken from the end where the friction is larger, so that its argument is
-    never positive: nothing overflows, however large λ is.
+    docs/numerics.md#straight-pieces.  The exponential is taken from the end where the friction is
+    larger, so that its argument is never positive: nothing overflows, however large λ is.
     """
     largest = eq.friction_coefficient(min(start, start + change), mu_s, delta_mu, decay_rate, g)
     whole, larger, smaller, both = moments_of_decay(decay_rate / g * abs(change))

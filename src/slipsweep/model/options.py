@@ -1,15 +1,44 @@
-"""The models and the solvers that a user may choose, and what of a model is estimated."""
+"""The models and the solvers that a user may choose, and the sources of their friction inputs."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Any, ClassVar, Literal, TypeAlias
 
 from slipsweep.errors import InputError
 from slipsweep.model.choices import Choice, Family, option
+from slipsweep.model.parameter_table import PARAMETER_TABLE
 from slipsweep.model.parameters import GRAVITY
 from slipsweep.model.variables import NEWMARK_REFERENCE, REFERENCE
 
 Rule: TypeAlias = Literal["rectangle", "trapezoid", "simpson"]
+
+
+class StepRule(IntEnum):
+    """Code of `Step.rule` in the kernels.
+
+    The rules are Euler's, Heun's and, where friction does not depend on the motion, Simpson's, else
+    that of Runge and Kutta.  Their errors are of the orders 1, 2 and 4.
+    """
+
+    RECTANGLE = 0
+    TRAPEZOID = 1
+    SIMPSON = 2
+
+
+class Rise(IntEnum):
+    """Code of `Mendez.rise` in the kernels; Newmark's block has one of its own."""
+
+    NEWMARK = 0
+    MONOTONE = 1
+    LITERAL = 2
+
+
+class Recoupling(IntEnum):
+    """Code of `Mendez.recoupling` in the kernels."""
+
+    EQ12 = 0
+    INTEGRATE = 1
 
 
 @dataclass(frozen=True)
@@ -37,9 +66,9 @@ class Mendez(Choice):
 
     References
     ----------
-    .. [1] B. C. Mendez, M. P. Romo and E. Botero (2012), "Linearization of rigid body dynamics on frictional interfaces
-       under harmonic loading", Soil Dynamics and Earthquake Engineering 32, 152-158,
-       https://doi.org/10.1016/j.soildyn.2011.08.007
+    .. [1] B. C. Mendez, M. P. Romo and E. Botero (2012), "Linearization of rigid body dynamics on
+       frictional interfaces under harmonic loading", Soil Dynamics and Earthquake Engineering 32,
+       152-158, https://doi.org/10.1016/j.soildyn.2011.08.007
 
     Examples
     --------
@@ -59,7 +88,7 @@ class Mendez(Choice):
 
 @dataclass(frozen=True)
 class Newmark(Choice):
-    """Newmark's rigid block [1]_: its acceleration is Üy while it slides, the base's while it rests.
+    """Newmark's rigid block [1]_, whose acceleration is Üy while it slides.
 
     Parameters
     ----------
@@ -68,10 +97,10 @@ class Newmark(Choice):
         upslope (`upslope_yield_acceleration`); displacements may then be negative, and what counts
         them, statistics and charts, takes ``|u|``.
     strength : {"constant", "weakening", "rate"}
-        Friction while it slides: μs; μr + (μs − μr) max(0, 1 − s/D), which falls with the slip s =
-        ∫|v|dt (`residual_mu` μr, `weakening_distance` D); or μf − (μf − μs) e^(−a|v|), which depends
-        on the velocity [2]_ (`fast_mu` μf, `rate_constant` a).  The block's acceleration is that of
-        Coulomb with this friction, which steps in time solve.
+        Friction while it slides.  "constant": μs.  "weakening": μr + (μs − μr) max(0, 1 − s/D),
+        which falls with the slip s = ∫|v|dt (`residual_mu` μr, `weakening_distance` D).  "rate":
+        μf − (μf − μs) e^(−a|v|), which depends on the velocity [2]_ (`fast_mu` μf, `rate_constant`
+        a).  The block's acceleration is that of Coulomb with this friction; steps in time solve it.
     g : float
         Gravity, m/s².
 
@@ -86,10 +115,11 @@ class Newmark(Choice):
 
     References
     ----------
-    .. [1] N. M. Newmark (1965), "Effects of earthquakes on dams and embankments", Géotechnique 15, 139-160,
-       https://doi.org/10.1680/geot.1965.15.2.139
-    .. [2] M. C. Constantinou, A. Mokha and A. M. Reinhorn (1990), "Teflon bearings in base isolation II: modeling",
-       Journal of Structural Engineering 116, 455-474, https://doi.org/10.1061/(ASCE)0733-9445(1990)116:2(455)
+    .. [1] N. M. Newmark (1965), "Effects of earthquakes on dams and embankments", Géotechnique 15,
+       139-160, https://doi.org/10.1680/geot.1965.15.2.139
+    .. [2] M. C. Constantinou, A. Mokha and A. M. Reinhorn (1990), "Teflon bearings in base
+       isolation II: modeling", Journal of Structural Engineering 116, 455-474,
+       https://doi.org/10.1061/(ASCE)0733-9445(1990)116:2(455)
 
     Examples
     --------
@@ -111,7 +141,7 @@ class Newmark(Choice):
 
 @dataclass(frozen=True)
 class Cycle(Choice):
-    """The solver that goes from event to event: exact to rounding for every excitation.
+    """The solver that goes from event to event, exact to rounding for every excitation.
 
     See Also
     --------
@@ -157,8 +187,8 @@ class Step(Choice):
 
     name: ClassVar[str] = "step"
     rule: Rule = option("rule of the steps; orders 1, 2 and 4", "trapezoid")
-    # by default the trapezoid's median error is 1e-5 (docs/speed.md); the most is what any accuracy
-    # needs, and more
+    # with the default the median error of the trapezoid is 1e-5 (docs/speed.md); no accuracy needs
+    # the largest number
     steps_per_cycle: int = option("steps in a cycle", 1024, least=8, most=16_777_216)
 
     def check(self) -> None:
@@ -183,7 +213,10 @@ def changing_strength(model: Model) -> str | None:
 
 
 def check_constant_strength(what: str, model: Model) -> None:
-    """Refuse a strength that changes while the block slides."""
+    """Raise InputError if the strength of the block changes while it slides.
+
+    `what` names the computation that does not allow it.
+    """
     if (strength := changing_strength(model)) is not None:
         raise InputError(f"strength = {strength!r}: not allowed for {what}, only 'constant'")
 
@@ -223,35 +256,39 @@ def solver_for(model: Model, solver: Any) -> Solver:
     return chosen
 
 
-#: Inputs that the displacement depends on: symbol, and the estimate in place of one that is not
-#: given.
-_INPUTS = {
-    "yield_acceleration": ("Üy", "by Coulomb"),
-    "decay_rate": ("λ", "by Eq. 6"),
-    "delta_mu": ("Δμ", "by Eqs. 10–11"),
+#: Inputs that the displacement depends on, and the rule that estimates one that is not given.
+_ESTIMATES = {
+    "yield_acceleration": "by Coulomb",
+    "decay_rate": "by Eq. 6",
+    "delta_mu": "by Eqs. 10–11",
 }
+_SYMBOLS = {row.name: row.symbol for row in PARAMETER_TABLE}
 
 
-def friction_inputs(model: str, given: Collection[str], drawn: Mapping[str, str]) -> str:
-    """Where Üy, λ and Δμ of a result come from, such as 'Üy, λ given; Δμ by Eqs. 10–11: estimated'.
+def friction_inputs(model: str, inputs: Collection[str], drawn: Mapping[str, str]) -> str:
+    """Sources of Üy, λ and Δμ of a result, such as 'Üy, λ given; Δμ by Eqs. 10–11: estimated'.
 
-    `drawn` has uncertain parameters, and whether a draw is the value ("absolute") or one about it
-    ("factor", "offset"). Newmark's block has only Üy.
+    `inputs` are the names of the parameters that are given.  `drawn` has the uncertain ones, each
+    with its kind: a draw is the value ("absolute"), or is applied to it ("factor", "offset").
+    Newmark's block has only Üy.
     """
-    if "yield_coefficient" in drawn or "yield_coefficient" in given:
-        return "Üy drawn" if "yield_coefficient" in drawn else "Üy given"
+    if "yield_coefficient" in drawn:
+        return "Üy drawn"
+    if "yield_coefficient" in inputs:
+        return "Üy given"
     parts: dict[str, list[str]] = {" given": [], " drawn": [], ": estimated": []}
-    for name, (symbol, rule) in _INPUTS.items():
+    for name, rule in _ESTIMATES.items():
         if model == "newmark" and name != "yield_acceleration":
             continue
-        if name in drawn and (name in given or drawn[name] == "absolute"):
+        symbol = _SYMBOLS[name]
+        if name in drawn and (name in inputs or drawn[name] == "absolute"):
             parts[" drawn"].append(symbol)
-        elif name in given:
+        elif name in inputs:
             parts[" given"].append(symbol)
         else:
-            notes = ["μmin given"] if name == "decay_rate" and "minimum_friction" in given else []
+            notes = ["μmin given"] if name == "decay_rate" and "minimum_friction" in inputs else []
             notes += ["drawn about it"] if name in drawn else []
             parts[": estimated"].append(
                 f"{symbol} {rule}" + (f" ({', '.join(notes)})" if notes else "")
             )
-    return "; ".join(", ".join(names) + what for what, names in parts.items() if names)
+    return "; ".join(", ".join(symbols) + source for source, symbols in parts.items() if symbols)

@@ -1,7 +1,7 @@
-"""What a caller gives, checked: one clear message for the first thing that cannot be.
+"""Checks of values that callers give: one clear message for the first that is not allowed.
 
-NumPy is imported where it is needed: the command line's options, hence `slipsweep --help`, come
-from here.
+The bounds and units are those of `model/parameter_table.py`.  NumPy is imported inside functions:
+the command line imports this module, and `slipsweep --help` need not load NumPy.
 """
 
 from __future__ import annotations
@@ -12,102 +12,44 @@ from collections.abc import Collection, Iterable, Mapping, Set
 from contextlib import suppress
 from decimal import Decimal
 from numbers import Real
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from slipsweep.errors import InputError
+from slipsweep.model.parameter_table import PARAMETER_TABLE, QUANTITIES, Bound
 from slipsweep.model.units import without_unit
-from slipsweep.model.variables import PARAMETERS
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-#: The largest number, whose inverse is the least of those that are above zero: more than physics
-#: ever needs, and so much less than the largest double that no result of several of them overflows.
-LARGEST = 1e30
-
 #: Gravity of the models by default, m/s²: the value that reproduces the paper's tables.
 GRAVITY = 9.81
 
-#: More than any shaking has, or any accuracy needs; the kernels count in 64 bits.
+#: Most cycles of shaking and most points of a history: more than any case needs, and far less than
+#: the kernels, which have 64 bits, can count.
 MOST_CYCLES = MOST_POINTS = 1_000_000_000
 
-#: Largest rate constant of friction, s/m: friction is the fast one from micrometres a second on, and
-#: steps are as short as that takes.
-FASTEST_RATE = 1e5
-
-#: Longest ramp in cycles, each of which has pieces of its own.
-MOST_RAMP = 100
-
-
-class Bound(NamedTuple):
-    """A closed interval, and how to say it."""
-
-    low: float
-    high: float
-    text: str
-
-    def holds(self, values: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Which values lie in the interval (NaN and infinity never do)."""
-        return (values >= self.low) & (values <= self.high)
-
-
-def _from(low: float, high: float) -> Bound:
-    least = f">= 0 and at most {high:g}" if low == 0.0 else f"from {low:g} to {high:g}"
-    return Bound(low, high, f"a finite number {'> 0, ' if low > 0.0 else ''}{least}")
-
-
-_ABOVE_0 = math.ulp(0.0)
-_BELOW_1 = math.nextafter(1.0, 0.0)
-_BELOW_90 = math.nextafter(90.0, 0.0)
-_FINITE, _NOT_NEGATIVE, _POSITIVE = (_from(low, LARGEST) for low in (-LARGEST, 0.0, 1.0 / LARGEST))
-
-#: What each parameter may be (MODEL: what no physics allows is an error, not a NaN).
+#: Bounds of each parameter and of other numbers.  A value that physics does not allow is an error,
+#: not a NaN.  Polarities are checked in `grid/inputs.py`.
 BOUNDS: dict[str, Bound] = {
-    "theta": Bound(0.0, _BELOW_90, "0 <= theta < 90 degrees"),
-    "phi": Bound(_ABOVE_0, _BELOW_90, "0 < phi < 90 degrees"),
-    "residual_phi": Bound(_ABOVE_0, _BELOW_90, "0 < residual_phi < 90 degrees"),
-    "rate_constant": _from(0.0, FASTEST_RATE),
-    "azimuth": Bound(0.0, 360.0, "0 <= azimuth <= 360 degrees"),
-    "quantile": Bound(_ABOVE_0, _BELOW_1, "a number between 0 and 1"),
-    **dict.fromkeys(("ramp_in", "ramp_out"), Bound(0.0, MOST_RAMP, f"0 to {MOST_RAMP}")),
-    **dict.fromkeys(("yield_acceleration", "yield_coefficient"), _FINITE),
-    **dict.fromkeys(
-        ("decay_rate", "delta_mu", "pgv", "arias_intensity", "threshold"), _NOT_NEGATIVE
-    ),
-    **dict.fromkeys(("amplitude", "displacement_amplitude"), _NOT_NEGATIVE),
-    **dict.fromkeys(("mu_s", "minimum_friction", "scale", "time_scale", "displacement"), _POSITIVE),
-    **dict.fromkeys(("residual_mu", "weakening_distance", "fast_mu"), _POSITIVE),
-    **dict.fromkeys(
-        (
-            "frequency",
-            "structure_frequency",
-            "maximum_amplitude",
-            "upslope_yield_acceleration",
-            "g",
-            "interval",
-        ),
-        _POSITIVE,
-    ),
+    **{row.name: row.bound for row in PARAMETER_TABLE if row.name != "polarity"},
+    **{name: quantity.bound for name, quantity in QUANTITIES.items()},
 }
 
-#: Own units of all that may bring one.
-_UNITS = {
-    "displacement": "m",
-    "threshold": "m",
-    "maximum_amplitude": "m s-2",
-    "g": "m s-2",
-    "interval": "s",
-} | {name: about["units"] for name, about in PARAMETERS.items()}
+#: Units to which values are converted that bring one.
+_UNITS: dict[str, str] = {
+    **{row.name: row.units for row in PARAMETER_TABLE},
+    **{name: quantity.units for name, quantity in QUANTITIES.items() if quantity.units},
+}
 
 
 def number_text(value: float) -> str:
-    """A number as people write it, and as precise as it is."""
+    """Return a number with all its digits, a whole one without a decimal point."""
     return repr(value).removesuffix(".0")
 
 
 def shown(value: Any) -> str:
-    """A value as an error shows it: one line, and not a long one."""
+    """Return the text of a value in an error: one line of at most 160 characters."""
     import numpy as np
 
     with np.errstate(all="ignore"):  # pandas and numpy compute to write numbers
@@ -116,10 +58,10 @@ def shown(value: Any) -> str:
 
 
 def check_numbers(key: str, values: Any) -> NDArray[np.float64]:
-    """Return `values` as float64; every number that a caller gives comes through here.
+    """Return `values` as an array of float64; every number that a caller gives is converted here.
 
-    InputError: they are no real numbers, or entries of them are masked: a masked entry has a
-    number, but means none.
+    InputError: they are not real numbers, or some entries are masked.  A masked entry stores a
+    number but stands for a missing value.
     """
     import numpy as np
 
@@ -130,14 +72,13 @@ def check_numbers(key: str, values: Any) -> NDArray[np.float64]:
         )
     try:
         array = np.asarray(array)
-        exact = array.dtype == object and all(
-            isinstance(one, (Real, Decimal)) for one in array.flat
+        are_real = array.dtype == object and all(
+            isinstance(entry, (Real, Decimal)) for entry in array.flat
         )
-        if array.dtype.kind not in "iuf" and not exact:
+        if array.dtype.kind not in "iuf" and not are_real:
             raise TypeError
-        with np.errstate(
-            over="ignore"
-        ):  # what is beyond double precision becomes infinite, and is refused as such
+        # numbers beyond double precision become infinite, and the bounds refuse infinity
+        with np.errstate(over="ignore"):
             return np.asarray(array.astype(np.float64))
     except (TypeError, ValueError, OverflowError):
         raise InputError(
@@ -146,32 +87,37 @@ def check_numbers(key: str, values: Any) -> NDArray[np.float64]:
 
 
 def computed(values: Any) -> Any:
-    """What lies within a lazy array or one of xarray, masks with it, which `numpy.asarray` would drop."""
+    """Return the array inside a DataArray or a dask array, with its mask.
+
+    `numpy.asarray` would drop the mask.
+    """
     values = getattr(values, "data", values) if hasattr(values, "dims") else values
-    dask = sys.modules.get("dask.array")  # is loaded if one of its arrays is here
+    dask = sys.modules.get("dask.array")  # it is loaded if `values` is one of its arrays
     return values.compute() if dask and isinstance(values, dask.Array) else values
 
 
 def check_values(
     name: str, values: Any, key: str | None = None, g: float = GRAVITY
 ) -> NDArray[np.float64]:
-    """Return `values` as float64 if all are in the bounds of parameter `name`, called `key` in errors (InputError).
+    """Return `values` as float64, in the unit of parameter `name` and within its bounds.
 
-    What brings a unit (a pint Quantity, an array of xarray with the attribute `units`) is converted
-    to the parameter's own; "g" is `g` m/s².
+    Values with a unit (a pint Quantity, a DataArray with the attribute `units`) are converted to
+    that of the parameter; the unit "g" is `g` m/s².  InputError: a value is out of bounds; the
+    message calls the parameter `key`.
     """
     key = key or name
-    array = check_numbers(
-        key, without_unit(key, _UNITS[name], values, g) if name in _UNITS else values
-    )
+    if name in _UNITS:
+        values = without_unit(key, _UNITS[name], values, g)
+    array = check_numbers(key, values)
     bound = BOUNDS[name]
-    for wrong in array[~bound.holds(array)][:1]:
-        raise InputError(f"{key} = {number_text(float(wrong))}: must be {bound.text}")
+    outside = array[~bound.holds(array)]
+    if outside.size:
+        raise InputError(f"{key} = {number_text(float(outside[0]))}: must be {bound.text}")
     return array
 
 
 def check_single(name: str, value: Any, key: str | None = None) -> float:
-    """Return a single number within the bounds of parameter `name`, called `key` in errors."""
+    """Return a single number within the bounds of parameter `name`; errors call it `key`."""
     values = check_values(name, value, key)
     if values.ndim:
         raise InputError(f"{key or name} = {shown(value)}: must be a single number")
@@ -179,7 +125,7 @@ def check_single(name: str, value: Any, key: str | None = None) -> float:
 
 
 def check_finite(key: str, value: Any) -> float:
-    """Return a single finite number of whatever sign."""
+    """Return a single finite number of any sign."""
     with suppress(InputError):
         number = check_numbers(key, value)
         if number.ndim == 0 and math.isfinite(number):
@@ -189,7 +135,7 @@ def check_finite(key: str, value: Any) -> float:
 
 def check_whole(name: str, value: Any, least: int, most: int | None = None) -> int:
     """Return `value` as an int if it is a whole number from `least` to `most`."""
-    number = value  # as it is: an integer may have more digits than a double
+    number = value  # not as a float: an integer may have more digits than a double
     if not isinstance(value, int) or isinstance(value, bool):
         number = math.nan
         with suppress(InputError):
@@ -202,33 +148,42 @@ def check_whole(name: str, value: Any, least: int, most: int | None = None) -> i
 
 
 def friction_coefficient(phi: Any) -> Any:
-    """Static friction coefficient μs = tan φ of friction angles, degrees (InputError: angles that are not allowed)."""
+    """Static friction coefficient μs = tan φ of friction angles in degrees.
+
+    InputError: an angle is out of bounds.
+    """
     import numpy as np
 
     check_values("phi", phi)
     return np.tan(np.radians(phi))
 
 
-def check_friction(given: Mapping[str, Any]) -> None:
-    """Refuse static friction that is not given, or given as a coefficient and as an angle; None is not given."""
-    if given.get("phi") is None:
-        check_given(given, ("mu_s",))
-    elif given.get("mu_s") is not None:
+def check_friction(inputs: Mapping[str, Any]) -> None:
+    """Raise InputError unless static friction is given as `mu_s` or as `phi`, not as both.
+
+    An input that is None is not given.
+    """
+    if inputs.get("phi") is None:
+        check_given(inputs, ("mu_s",))
+    elif inputs.get("mu_s") is not None:
         raise InputError("phi, mu_s: must not both be given; mu_s = tan(phi)")
 
 
 def single_friction_coefficient(mu_s: Any, phi: Any) -> float:
-    """The friction coefficient of one block, given itself or as the friction angle (InputError: both, or neither)."""
+    """Return the friction coefficient of one block, from `mu_s` or from the friction angle `phi`.
+
+    InputError: both are given, or neither.
+    """
     check_friction({"mu_s": mu_s, "phi": phi})
-    return check_single(
-        "mu_s", mu_s if phi is None else friction_coefficient(check_single("phi", phi))
-    )
+    if phi is not None:
+        mu_s = friction_coefficient(check_single("phi", phi))
+    return check_single("mu_s", mu_s)
 
 
-def check_given(given: Mapping[str, Any], names: Collection[str]) -> None:
-    """Refuse to go on without a parameter that has no default; None is none."""
+def check_given(inputs: Mapping[str, Any], names: Collection[str]) -> None:
+    """Raise InputError if one of the parameters `names` is missing, or None."""
     for name in names:
-        if given.get(name) is None:
+        if inputs.get(name) is None:
             raise InputError(f"{name}: must be given")
 
 
@@ -240,23 +195,29 @@ def check_choice(name: str, value: Any, allowed: Collection[str]) -> str:
 
 
 def check_choices(name: str, values: Any, allowed: Collection[str]) -> tuple[str, ...]:
-    """Return which of `allowed` a caller names, one at least, in the order of `allowed`."""
-    wanted = [check_choice(name, value, allowed) for value in check_list(name, values, "names")]
-    if not wanted:
+    """Return the names in `values`, in the order of `allowed`.
+
+    InputError: a name is not in `allowed`, or there is none.
+    """
+    names = [check_choice(name, value, allowed) for value in check_list(name, values, "names")]
+    if not names:
         raise InputError(f"{name} = []: must name one of {', '.join(map(repr, allowed))} at least")
-    return tuple(one for one in allowed if one in wanted)
+    return tuple(choice for choice in allowed if choice in names)
 
 
 def check_list(key: str, values: Any, what: str) -> list[Any]:
-    """Return what stands in a list, an array or anything else that has an order."""
+    """Return the entries of a list, an array or another ordered collection.
+
+    `what` says in errors what the entries should be.
+    """
     if isinstance(values, Iterable) and not isinstance(values, (str, bytes, Mapping, Set)):
-        with suppress(TypeError):  # an array without dimensions
+        with suppress(TypeError):  # of an array without dimensions
             return list(values)
     raise InputError(f"{key} = {shown(values)}: must be a list of {what}")
 
 
 def check_progress(progress: Any) -> Any:
-    """Return the function that is called with numbers of cells as they are solved, if there is one."""
+    """Return `progress`, a function of a number of cells or None (InputError: it is neither)."""
     if progress is not None and not callable(progress):
         raise InputError(f"progress = {shown(progress)}: must be a function of a number of cells")
     return progress

@@ -1,13 +1,15 @@
-"""Names, units and CF attributes of everything slipsweep reads or returns, written once.
+"""Names, units and CF attributes of results, each written once; and the codes that results hold.
 
-`PARAMETERS` describes the inputs (they become coordinates), `RESULTS` what a sweep returns,
-`HISTORY` what `simulate` returns along time.  Datasets, netCDF files, the sweep-file schema and
-figures all take their words from here.
+`RESULTS` has what a sweep returns, `HISTORY` what `simulate` returns along time.  Datasets, netCDF
+files, tables and figures take their words from here.  The inputs, which become coordinates, are
+declared in `model/parameter_table.py`; `PARAMETERS` has their attributes.
 """
 
 from collections.abc import Mapping
 from enum import IntEnum, IntFlag, StrEnum
 from typing import Any, Self
+
+from slipsweep.model.parameter_table import PARAMETER_TABLE
 
 REFERENCE = (
     "B. C. Mendez, M. P. Romo, E. Botero (2012), Linearization of rigid body dynamics on "
@@ -45,21 +47,21 @@ class SlidingMode(IntEnum):
 
 
 class FlagKind(StrEnum):
-    """Kind of a flag: whether the value of its cell can be used."""
+    """Kind of a flag: it decides if the value of the cell can be used."""
 
     NO_VALUE = "no value"  # NaN, and sliding mode missing
     CAUTION = "caution"
     NOTE = "note"
 
 
-#: The same in words, for people.
+#: The meaning of each kind, in words.
 FLAG_KIND_TEXT: dict[FlagKind, str] = {
     FlagKind.NO_VALUE: "the model does not apply",
     FlagKind.CAUTION: "an assumption of the model is violated",
     FlagKind.NOTE: "no assumption is violated; a special rule or an estimate was used",
 }
 
-#: What is said of cells that have lost their flags.
+#: Text for cells without flags.
 UNFLAGGED_TEXT = "another program has masked or joined these cells, and left them without flags"
 
 
@@ -86,7 +88,7 @@ class Validity(IntFlag):
     text: str
 
     def __new__(cls, mask: int, kind: FlagKind = FlagKind.NO_VALUE, text: str = "") -> Self:
-        """A flag with its kind and its text."""
+        """Make a flag with its kind and its text."""
         flag = int.__new__(cls, mask)
         flag._value_ = mask
         flag.kind = kind
@@ -109,7 +111,8 @@ class Validity(IntFlag):
         16,
         FlagKind.NOTE,
         (
-            "the yield acceleration governs: the result is that of Newmark's block and does not depend on lambda"
+            "the yield acceleration governs: the result is that of Newmark's block and does not "
+            "depend on lambda"
         ),
     )
     KD_NOT_POSITIVE = 32, FlagKind.NO_VALUE, "literal rise: Kd <= 0, Eq. 12 cannot stop the block"
@@ -142,7 +145,8 @@ class Validity(IntFlag):
         2048,
         FlagKind.CAUTION,
         (
-            "residual_mu or fast_mu <= tan(theta): once it slides, the block may not stop under its own weight"
+            "residual_mu or fast_mu <= tan(theta): once it slides, the block may not stop under "
+            "its own weight"
         ),
     )
     NOT_AT_REST = (
@@ -153,13 +157,13 @@ class Validity(IntFlag):
 
 
 def flags_of(kind: FlagKind) -> Validity:
-    """All flags of a kind."""
+    """Return all flags of a kind."""
     return Validity(sum(flag for flag in Validity if flag.kind is kind))
 
 
 VALUELESS, CAUTIONS, NOTES = (flags_of(kind) for kind in FlagKind)
 
-#: Flags of blocks without a value that slide for good: their displacement exceeds every length.
+#: Flags of blocks without a value that never stop: their displacement exceeds every length.
 ENDLESS = Validity.STATICALLY_UNSTABLE | Validity.NOT_AT_REST
 
 
@@ -169,7 +173,7 @@ class _Status(IntEnum):
     text: str
 
     def __new__(cls, code: int, text: str = "") -> Self:
-        """A code with its text."""
+        """Make a code with its text."""
         status = int.__new__(cls, code)
         status._value_ = code
         status.text = text
@@ -177,7 +181,7 @@ class _Status(IntEnum):
 
 
 class LimitStatus(_Status):
-    """How a limit amplitude was found, or why there is none."""
+    """Status of a limit amplitude: the kind of the limit, or the reason why there is none."""
 
     REACHED = 0, "the displacement is reached where it is continuous"
     AT_MODE_JUMP = 1, "the displacement is exceeded by the jump where the sliding mode changes"
@@ -191,7 +195,7 @@ class LimitStatus(_Status):
 
 
 class StrengthStatus(_Status):
-    """How a required strength was found, or why there is none."""
+    """Status of a required strength: solved, or the reason why there is none."""
 
     SOLVED = 0, "the displacement at the required strength is the tolerable one"
     ALWAYS_WITHIN = (
@@ -202,7 +206,7 @@ class StrengthStatus(_Status):
 
 
 class SensitivityStatus(_Status):
-    """Whether there are Sobol indices, or why there are none."""
+    """Status of Sobol indices: computed, or the reason why there are none."""
 
     COMPUTED = 0, "there are indices"
     NO_VARIANCE = 1, "all runs have the same displacement"
@@ -226,49 +230,31 @@ def _coded(
     long_name: str, codes: Any, ancillary: str | None = None, key: str = "flag_values"
 ) -> dict[str, Any]:
     """CF attributes of a variable of codes; one below 0 is that of a missing value."""
-    known = [code for code in codes if code >= 0]
-    meanings = " ".join(code.name.lower() for code in known)
+    valued = [code for code in codes if code >= 0]
+    meanings = " ".join(code.name.lower() for code in valued)
     more = {"ancillary_variables": ancillary} if ancillary else {}
     return {
         "long_name": long_name,
-        key: [int(code) for code in known],
+        key: [int(code) for code in valued],
         "flag_meanings": meanings,
     } | more
 
 
-#: Which way u is measured.
+def _estimated(name: str, rule: str) -> dict[str, Any]:
+    """CF attributes of a parameter as a result, with the rule that estimates it."""
+    attributes = PARAMETERS[name]
+    return {**attributes, "long_name": f"{attributes['long_name']} ({rule})"}
+
+
+#: The direction in which u is measured.
 _DIRECTION = (
-    "of the block relative to the base, in the direction of the base's acceleration: horizontal where that is; by "
-    "statics the distance along the plane is that of Newmark's block times cos(phi - theta) / cos(phi), mu_s = tan(phi)"
+    "of the block relative to the base, in the direction of the base's acceleration: horizontal "
+    "where that is; by statics the distance along the plane is that of Newmark's block times "
+    "cos(phi - theta) / cos(phi), mu_s = tan(phi)"
 )
 
-#: Inputs: attributes of their coordinates, in the order of the dimensions of a result.
-PARAMETERS: dict[str, dict[str, Any]] = {
-    "theta": _cf("degree", "base inclination"),
-    "mu_s": _cf("1", "static friction coefficient"),
-    "phi": _cf("degree", "friction angle of the interface"),
-    "amplitude": _cf("m s-2", "peak ground acceleration"),
-    "displacement_amplitude": _cf("m", "peak ground displacement"),
-    "frequency": _cf("Hz", "excitation frequency"),
-    "yield_acceleration": _cf("m s-2", "yield acceleration"),
-    "yield_coefficient": _cf("1", "yield coefficient, yield acceleration over g"),
-    "upslope_yield_acceleration": _cf("m s-2", "yield acceleration upslope"),
-    "decay_rate": _cf("1", "friction decay with loading rate"),
-    "delta_mu": _cf("1", "friction above static"),
-    "minimum_friction": _cf("1", "minimum friction coefficient"),
-    "residual_mu": _cf("1", "residual friction coefficient"),
-    "residual_phi": _cf("degree", "residual friction angle of the interface"),
-    "weakening_distance": _cf("m", "slip over which friction falls to its residual value"),
-    "fast_mu": _cf("1", "friction coefficient at high velocity"),
-    "rate_constant": _cf("s m-1", "rate by which friction depends on velocity"),
-    "structure_frequency": _cf("Hz", "natural frequency of the structure"),
-    "scale": _cf("1", "scale factor of the recorded acceleration"),
-    "pgv": _cf("m s-1", "peak ground velocity that motions are scaled to"),
-    "arias_intensity": _cf("m s-1", "Arias intensity that motions are scaled to"),
-    "time_scale": _cf("1", "factor on the time of the record"),
-    "polarity": _cf("1", "sign that the recorded acceleration is taken with"),
-    "azimuth": _cf("degree", "downslope direction, from the first component to the second"),
-}
+#: Inputs: CF attributes of their coordinates, in the order of the dimensions of a result.
+PARAMETERS: dict[str, dict[str, Any]] = {row.name: row.attributes for row in PARAMETER_TABLE}
 
 #: Friction angles, each with the friction coefficient that it stands for.
 ANGLES = {"phi": "mu_s", "residual_phi": "residual_mu"}
@@ -298,25 +284,18 @@ INTERFACE_INPUTS = (
     "rate_constant",
 )
 
-#: Inputs that the shaking has if it is a waveform, and if it is a record.
-WAVEFORM_INPUTS = ("amplitude", "displacement_amplitude", "frequency", "structure_frequency")
-RECORD_INPUTS = (
-    "amplitude",
-    "scale",
-    "pgv",
-    "arias_intensity",
-    "time_scale",
-    "polarity",
-    "azimuth",
-)
+#: Inputs of the shaking if it is a waveform, and if it is a record.
+WAVEFORM_INPUTS = tuple(row.name for row in PARAMETER_TABLE if "waveform" in row.shaking)
+RECORD_INPUTS = tuple(row.name for row in PARAMETER_TABLE if "record" in row.shaking)
 
-#: Of them, those that say how strong a motion is: one of them is given.
+#: Inputs of a record that say how strong the motion is; one of them is given.
 STRENGTHS = ("amplitude", "scale", "pgv", "arias_intensity")
 
 #: Inputs that may be drawn: all that the displacement depends on.
-DRAWN = tuple(
-    name for name in PARAMETERS if name not in ("structure_frequency", "polarity", "azimuth")
-)
+DRAWN = tuple(row.name for row in PARAMETER_TABLE if row.drawn)
+
+#: Inputs that [model] of a sweep file may give, as one number for the whole sweep.
+MODEL_INPUTS = tuple(row.name for row in PARAMETER_TABLE if row.in_model)
 
 #: Results of Newmark's block that slides both ways: extremes of u over time.
 EXTREMES: dict[str, dict[str, Any]] = {
@@ -328,7 +307,7 @@ EXTREMES: dict[str, dict[str, Any]] = {
     ),
 }
 
-#: Results of Newmark's block that slides both ways, not of others; the last on request.
+#: Results of Newmark's block that slides both ways only; the last of them on request.
 BOTH_WAYS: dict[str, dict[str, Any]] = {
     **EXTREMES,
     "clearance": _cf("m", "clearance, largest less smallest displacement over time", "validity"),
@@ -346,12 +325,12 @@ RESULTS: dict[str, dict[str, Any]] = {
         "m", "permanent displacement of Newmark's block, downslope", "validity", comment=_DIRECTION
     ),
     **BOTH_WAYS,
-    "yield_acceleration": _cf("m s-2", "yield acceleration"),
+    "yield_acceleration": PARAMETERS["yield_acceleration"],
     "limiting_acceleration": _cf("m s-2", "limiting acceleration (Eq. 7)"),
     "acceleration_ratio": _cf("1", "peak ground over limiting acceleration"),
-    "minimum_friction": _cf("1", "minimum friction coefficient (Eq. 9)"),
-    "delta_mu": _cf("1", "friction above static (Eqs. 10, 11)"),
-    "decay_rate": _cf("1", "friction decay with loading rate (Eq. 6 at the peak)"),
+    "minimum_friction": _estimated("minimum_friction", "Eq. 9"),
+    "delta_mu": _estimated("delta_mu", "Eqs. 10, 11"),
+    "decay_rate": _estimated("decay_rate", "Eq. 6 at the peak"),
     # where the displacement amplitude and the frequency span a grid; elsewhere it is a coordinate
     "amplitude": PARAMETERS["amplitude"],
 }
@@ -375,8 +354,8 @@ LIMIT_RESULTS: dict[str, dict[str, Any]] = {
     ),
 }
 
-#: Results of a record, further to the displacement, the velocity and the validity: -1 where there
-#: is no value.
+#: Further results under a record, beside displacement, velocity and validity; -1 where there is no
+#: value.
 RECORD_COUNTS: dict[str, dict[str, Any]] = {
     "number_of_slips": _cf("1", "number of slips that begin at rest", "validity"),
     "stick_slip_pulses": _cf("1", "number of pulses in stick-slip mode", "validity"),
@@ -411,11 +390,10 @@ MOTION_COORDINATES: dict[str, dict[str, Any]] = {
     **{f"motion_{name}": about for name, about in INTENSITY_MEASURES.items()},
 }
 
-#: Of them, long texts, that no table repeats in every row: `slipsweep info` and the file itself
-#: tell them.
+#: Those with long texts, which tables leave out; `slipsweep info` and the file itself have them.
 MOTION_FILES = ("motion_file", "motion_sha256")
 
-#: The record itself, in the files of results: what is read back to repeat a run.
+#: Samples of a record, stored in files of results so that a run can be repeated.
 RECORD_SAMPLES: dict[str, dict[str, Any]] = {
     "record_time": _cf("s", "time of a sample of the record"),
     "record_acceleration": _cf(
@@ -425,7 +403,7 @@ RECORD_SAMPLES: dict[str, dict[str, Any]] = {
     ),
 }
 
-#: Coordinates of the statistics of `sample`, further to the parameters.
+#: Coordinates of the statistics of `sample`, beside the parameters.
 STATISTIC_COORDINATES: dict[str, dict[str, Any]] = {
     "quantile": _cf("1", "share of the samples with a value that lies below"),
     "threshold": _cf("m", "displacement to exceed"),
@@ -463,8 +441,7 @@ STATISTICS: dict[str, dict[str, Any]] = {
     ),
 }
 
-#: Statistics over the motions of a suite; all but counts and shares are of the motions that have a
-#: value.
+#: Statistics over the motions of a suite.  All but counts and shares are of motions with a value.
 SUITE_STATISTICS: dict[str, dict[str, Any]] = {
     "value_count": _cf("1", "number of motions with a value"),
     "valueless_count": _cf("1", "number of motions without a value"),
@@ -484,11 +461,14 @@ SUITE_STATISTICS: dict[str, dict[str, Any]] = {
     "exceedance_probability": STATISTICS["exceedance_probability"],
 }
 
-#: Inputs that `required_strength` may solve for, and the attributes of what it finds.
+#: Inputs that `required_strength` may solve for, and the attributes of its results.
 REQUIRED_STRENGTHS: dict[str, dict[str, Any]] = {
-    "yield_coefficient": _cf("1", "required yield coefficient", "required_status"),
-    "mu_s": _cf("1", "required static friction coefficient", "required_status"),
-    "phi": _cf("degree", "required friction angle of the interface", "required_status"),
+    name: _cf(
+        PARAMETERS[name]["units"],
+        f"required {PARAMETERS[name]['long_name'].partition(',')[0]}",
+        "required_status",
+    )
+    for name in ("yield_coefficient", "mu_s", "phi")
 }
 
 #: Results of `required_strength`: of each motion or sample, or of all of them together.
@@ -529,8 +509,8 @@ def counted(about: Mapping[str, Any], attributes: Mapping[Any, Any]) -> dict[str
     return {**about, "long_name": counted_text(str(about["long_name"]), attributes)}
 
 
-#: The mean annual rate at which a displacement is exceeded, and its parts that lie outside of the
-#: grid's amplitudes.
+#: The mean annual rate of exceeding a displacement, and its parts outside of the amplitudes of the
+#: grid.
 HAZARD_RESULTS: dict[str, dict[str, Any]] = {
     "annual_rate": _cf(
         "year-1",
@@ -549,7 +529,7 @@ HAZARD_RESULTS: dict[str, dict[str, Any]] = {
     "valueless_share": _cf("1", "largest share of the motions without a value at any amplitude"),
 }
 
-#: What published equations add to statistics and annual rates.
+#: Further variables of statistics and annual rates by published equations.
 PUBLISHED_RESULTS: dict[str, dict[str, Any]] = {
     "in_range": {
         "long_name": "whether the inputs lie in the range of the equation",
@@ -577,7 +557,7 @@ RESULT_DTYPES: dict[str, str] = {
 #: Displacements that may be negative where a block slides both ways.
 SIGNED = ("permanent_displacement", *EXTREMES)
 
-#: What `sweep` returns where no variables are named; of a suite also the factor on each motion.
+#: Default results of `sweep`; under a suite also the factor on each motion.
 DEFAULT_RESULTS = ("permanent_displacement", "peak_relative_velocity", "sliding_mode", "validity")
 DEFAULT_RECORD_RESULTS = (
     "permanent_displacement",
@@ -605,7 +585,7 @@ HISTORY: dict[str, dict[str, Any]] = {
     "relative_displacement": _cf("m", "relative displacement of the block", comment=_DIRECTION),
 }
 
-#: The positive half waves of the record that a time history is of, along `half_wave`.
+#: Positive half waves of the record of a time history, along `half_wave`.
 HALF_WAVES: dict[str, dict[str, Any]] = {
     "half_wave_start": _cf("s", "time at which the acceleration of the base rises through zero"),
     "half_wave_end": _cf("s", "time at which it falls through zero"),
@@ -616,14 +596,14 @@ HALF_WAVES: dict[str, dict[str, Any]] = {
     ),
 }
 
-#: What Eq. 1 makes of a test on a shaking table, along time.
+#: Friction that a test on a shaking table measured, along time (`measured_friction`).
 MEASURED_FRICTION: dict[str, dict[str, Any]] = {
     "friction_coefficient": _cf("1", "friction coefficient by Eq. 1"),
     "friction_ratio": _cf("1", "friction coefficient by Eq. 1 over the static one"),
     "free_body_friction": _cf("1", "friction coefficient by statics; at rest the mobilised one"),
 }
 
-#: The slides that a test shows.
+#: Slides in a test, along `slide`.
 SLIDES: dict[str, dict[str, Any]] = {
     "slide_onset": _cf("s", "time at which a slide begins"),
     "slide_peak": _cf("s", "time of the largest table acceleration within a slide"),
@@ -635,7 +615,7 @@ SLIDES: dict[str, dict[str, Any]] = {
     "slide_free_body_friction": _cf("1", "median friction coefficient by statics within a slide"),
 }
 
-#: Results of `calibrate` that have no other name here.
+#: Further results of `calibrate`.
 CALIBRATION: dict[str, dict[str, Any]] = {
     "correlation": _cf("1", "correlation of two parameters as estimated"),
     "cycle_start": _cf("s", "time at which a cycle begins"),
@@ -651,7 +631,7 @@ CALIBRATION: dict[str, dict[str, Any]] = {
     },
 }
 
-#: What was measured, and what is computed with the parameters found, along time.
+#: Series of a test, measured, and computed with the calibrated parameters, along time.
 CALIBRATION_SERIES: dict[str, dict[str, Any]] = {
     f"{kind}_{name}": {**about, "long_name": f"{kind} {about['long_name']}"}
     for kind in ("measured", "computed")

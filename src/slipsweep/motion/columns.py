@@ -24,23 +24,23 @@ _RATE = (
     rf"[^=:\n\d]*[=:]?\s*{_STEP}"
 )
 
-#: Names of a first column: times, and what else increases from line to line.
+#: Names of a first column: of times, and of other numbers that increase from line to line.
 _TIME = r"(?:t|time|zeit|tiempo|temps|tempo|zaman)\b"
 _NO_TIME = r"(?:period\w*|freq\w*|f|n|no|nr|num\w*|sample\w*|index|point\w*|step|count|i)\b"
 
 _NO_SECONDS = r"(ms|msecs?|milliseconds?|min|minutes?)\b"
 
-#: Shares of the differences of a column of times that are positive at least, and negative at most:
-#: places may be damaged.
+#: Least share of positive differences in a column of times, and largest share of negative ones:
+#: some lines may be damaged.
 _RISES = 0.5
 _FALLS = 0.1
 
 
 @dataclass(frozen=True)
 class _Text:
-    """A plain text, taken apart."""
+    """A plain text, split into its parts."""
 
-    header: str  # what stands before the numbers, but for the names
+    header: str  # the lines before the numbers, but for the names
     names: list[str]  # of the columns; empty texts if there are none
     rows: list[tuple[int, str]]  # numbered lines of numbers
     cells: list[list[str]]  # of each
@@ -52,7 +52,7 @@ class _Text:
 
     @property
     def listed(self) -> str:
-        """The columns, as messages show them."""
+        """The columns, in words for messages."""
         names = f" ({', '.join(self.names)})" if any(self.names) else ""
         return f"{self.width} numbers on a line{names}"
 
@@ -64,7 +64,7 @@ class _Text:
         )
 
     def table(self, rule: str) -> Floats:
-        """The numbers in lines and columns, NaN where blank (InputError: a line has others)."""
+        """Return the numbers by line and column, NaN where blank (InputError: a line differs)."""
         values = []
         for (number, line), cells in zip(self.rows, self.cells, strict=True):
             try:
@@ -76,7 +76,7 @@ class _Text:
         return np.array(values)
 
     def series(self) -> Floats:
-        """The numbers one after the other."""
+        """Return the numbers one after the other."""
         values: list[float] = []
         for (number, line), cells in zip(self.rows, self.cells, strict=True):
             try:
@@ -87,9 +87,9 @@ class _Text:
 
 
 def read_plain(lines: list[str], reading: Reading) -> tuple[str, Samples]:
-    """Return the format of a plain text (csv, columns or values), and what it holds.
+    """Return the format of a plain text (csv, columns or values), and its samples.
 
-    InputError: it is no record, or it may be several, and it is not said which is to be read.
+    InputError: it is no record, or it holds several and no channel is chosen.
     """
     header, rows = _header_and_rows(lines)
     if not rows:
@@ -125,7 +125,7 @@ def read_plain(lines: list[str], reading: Reading) -> tuple[str, Samples]:
 
 
 def chosen_channel(channel: int | None, names: Sequence[str]) -> int:
-    """Return the place of a channel among those of a file (InputError: which one is not said)."""
+    """Return the index of a channel among those of a file (InputError: none is chosen)."""
     if channel is None and len(names) == 1:
         return 0
     if channel is None or not 1 <= channel <= len(names):
@@ -161,7 +161,7 @@ def _kind(text: _Text, reading: Reading) -> str:
 
 
 def _with_times(text: _Text, reading: Reading) -> Samples:
-    """The column of times, and the one of accelerations that is asked for."""
+    """Return the column of times, and the chosen column of accelerations."""
     if reading.interval is not None:
         raise InputError(
             f"interval = {reading.interval:g}: the first column is that of times; "
@@ -217,7 +217,8 @@ def _without_names(header: str, width: int) -> tuple[str, list[str]]:
             while len(names) > width and not names[-1]:
                 names.pop()
             if len(names) == width and all(names):
-                above, upper = "\n".join(lines[:at]), [""] * width
+                above = "\n".join(lines[:at])
+                upper = [""] * width
                 if width > 1 and all(map(is_unit, names)):  # the names are above their units
                     above, upper = _without_names(above, width)
                 names = [" ".join(filter(None, both)) for both in zip(upper, names, strict=True)]
@@ -228,7 +229,7 @@ def _without_names(header: str, width: int) -> tuple[str, list[str]]:
 
 
 def _split_names(text: str, is_last: bool) -> Iterator[list[str]]:
-    """The names that a line may give, by each of the separators that it may have."""
+    """Yield the names that a line may give, for each of its possible separators."""
     if not is_sentence(text):
         yield [text]
     for separator in (r"\t", ";", ",", r"\s{2,}"):
@@ -245,19 +246,19 @@ def _split_names(text: str, is_last: bool) -> Iterator[list[str]]:
 
 
 def _interval_in(header: str) -> float | None:
-    """The sampling interval that a header gives, s."""
-    if found := re.search(_INTERVAL, header):
-        step = float(found[1].replace(",", "."))
-        behind = header[found.end() :].lstrip()
-        is_milli = re.match(r"(?i)m(?:illi)?s", behind) or re.search(r"(?i)\bms", found[0])
+    """Return the sampling interval that a header gives, s."""
+    if match := re.search(_INTERVAL, header):
+        step = float(match[1].replace(",", "."))
+        following = header[match.end() :].lstrip()
+        is_milli = re.match(r"(?i)m(?:illi)?s", following) or re.search(r"(?i)\bms", match[0])
         return step / 1000.0 if is_milli else step
-    if found := re.search(_RATE, header):
-        return 1.0 / max(float(found[1].replace(",", ".")), 1e-30)
+    if match := re.search(_RATE, header):
+        return 1.0 / max(float(match[1].replace(",", ".")), 1e-30)
     return None
 
 
 def _header_and_rows(lines: list[str]) -> tuple[str, list[tuple[int, str]]]:
-    """Split a file where the first line begins with a number; lines are numbered, no comments."""
+    """Split a file before the first line that begins with a number; rows are numbered."""
     first = next(
         (at for at, line in enumerate(lines) if re.fullmatch(NUMBER, [*_cells(line), ""][0])),
         len(lines),

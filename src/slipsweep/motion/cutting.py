@@ -1,4 +1,4 @@
-"""A waveform, or a record, cut into the pieces that the solvers go through (`pieces.Wave`).
+"""Waveforms and records cut into the pieces that the solvers follow (`pieces.Wave`).
 
 The shaking is cut where w jumps, bends, turns and passes 0, so that w is monotone, smooth and of
 one sign on each piece (and further where a smooth one would be too long for its polynomial).  From
@@ -27,17 +27,17 @@ from slipsweep.motion.waveforms import Harmonics, Waveform
 #: series that is left out is 1.3e-18 (docs/numerics.md#pieces-of-a-wave).
 _LONGEST = 0.5 * math.pi
 
-#: Points of a cycle closer than this, as parts of it, are one; so are values of w closer than the
-#: second.
+#: Distance below which two points of a cycle are one, as a part of the cycle, and difference below
+#: which two values of w are one.
 _SAME = 1e-12
 _ROUNDING = 1e-15
 
-#: Intervals that are searched in each period of the fastest harmonic, and the highest derivative
-#: whose zeros part them.
+#: Intervals that are searched in each period of the fastest harmonic, and the order of the highest
+#: derivative whose zeros divide them.
 _INTERVALS = 12
 _HIGHEST = 4
 
-# 80-bit numbers where the machine has them: coefficients then are right to the last digit
+# 80-bit numbers where the machine has them: then the last digit of the coefficients is right
 _Extended = np.longdouble
 _TWO_PI = _Extended("6.283185307179586476925286766559005768")
 
@@ -47,10 +47,11 @@ Derivative = Callable[[Exact, int], Exact]
 
 @functools.lru_cache
 def _period(waveform: Waveform) -> tuple[Sequence[float], Sequence[Derivative], int, bool]:
-    """Where a cycle without ramps breaks, what gives the derivatives of w behind each break, the fastest multiple.
+    """Return a cycle without ramps: its breaks, derivatives, fastest multiple, and if it is a sine.
 
-    Places are parts of the cycle, derivatives are by phase in radians; the multiple is 0 where w is
-    straight.  Last, whether w is a sine of whatever phase, whose pieces have closed forms.
+    Breaks are parts of the cycle.  There is a function for the derivatives of w behind each break,
+    by phase in radians.  The multiple of the fastest harmonic is 0 where w is straight.  The pieces
+    of a sine, of any phase, have closed forms.
     """
     quarters = (0.0, 0.25, 0.5, 0.75, 1.0)
     if waveform.name == "triangle":
@@ -74,7 +75,7 @@ def _period(waveform: Waveform) -> tuple[Sequence[float], Sequence[Derivative], 
 
 
 def _line(start: float, first: float, slope: float) -> Derivative:
-    """A straight line from a place on, its slope by cycle."""
+    """Return a straight line that starts at a place; its slope is by cycle."""
     line = np.polynomial.Polynomial(np.array([first, slope], _Extended))
     return lambda u, order: (
         line.deriv(max(order, 0))(u - _Extended(start)) / _TWO_PI ** max(order, 0)
@@ -84,7 +85,7 @@ def _line(start: float, first: float, slope: float) -> Derivative:
 def _sum_of_sines(
     amplitudes: Sequence[float], multiples: Sequence[int], phases: Sequence[float]
 ) -> Derivative:
-    """Σ aₖ sin(mₖφ + pₖ), with the largest aₖ as the unit."""
+    """Return Σ aₖ sin(mₖφ + pₖ), divided by the largest aₖ."""
     a, m, p = (
         np.array(column, _Extended)[:, np.newaxis] for column in (amplitudes, multiples, phases)
     )
@@ -100,7 +101,7 @@ def _sum_of_sines(
 
 
 def _edges(low: float, high: float, fastest: int) -> Exact:
-    """Edges of the intervals that are searched, the inner ones where no plain wave has a zero."""
+    """Return the edges of the intervals to search; no simple wave has a zero at the inner ones."""
     count = max(2, math.ceil(_INTERVALS * max(fastest, 1) * (high - low)))
     return np.concatenate(
         [[low], low + (high - low) * (np.arange(count) + 0.381966) / count, [high]]
@@ -108,13 +109,13 @@ def _edges(low: float, high: float, fastest: int) -> Exact:
 
 
 def _sign_changes(derivative: Derivative, lowest: int, edges: Exact) -> list[Exact]:
-    """Places between the edges where derivatives change sign, ascending, of the orders from the lowest on.
+    """Return the places at which derivatives change sign, for each order from the lowest on.
 
-    Bracketed, the highest order first: between two places where the next derivative does so this
-    one is monotone, and passes 0 once at most.  Then by Newton's iteration, guarded as that of
-    `kernels.events`.
+    The highest order is searched first.  Between two sign changes of the next derivative this one
+    is monotone, so that it has one zero at most; its bracket is then narrowed by Newton's
+    iteration, guarded as in `kernels.roots`.
     """
-    found: list[Exact] = []
+    zeros_by_order: list[Exact] = []
     for order in range(_HIGHEST, lowest - 1, -1):
         below = derivative(edges, order) < 0
         at = np.flatnonzero(below[:-1] != below[1:])
@@ -124,7 +125,7 @@ def _sign_changes(derivative: Derivative, lowest: int, edges: Exact) -> list[Exa
         last = high - low
         before = high - low
         while (moves := last > np.finfo(float).eps).any():
-            value, slope = (derivative(zero, one).astype(float) for one in (order, order + 1))
+            value, slope = (derivative(zero, n).astype(float) for n in (order, order + 1))
             same = (value < 0) == below[at]
             low = np.where(same, zero, low)
             high = np.where(same, high, zero)
@@ -136,13 +137,13 @@ def _sign_changes(derivative: Derivative, lowest: int, edges: Exact) -> list[Exa
             before = last
             last = moves * np.abs(new - zero)
             zero = np.where(moves, new, zero)
-        found.insert(0, zero)
+        zeros_by_order.insert(0, zero)
         edges = np.sort(np.concatenate([edges, zero]))
-    return found
+    return zeros_by_order
 
 
 def _pieces(waveform: Waveform, n: int) -> tuple[Exact, ...]:
-    """The pieces of cycle n, as `_monotone_pieces` gives them."""
+    """Return the pieces of cycle n, as `_monotone_pieces` does."""
     breaks, derivatives, fastest, _ = _period(waveform.plain)
     rise = _Extended(waveform.ramp_in)
     fall = _Extended(waveform.ramp_out)
@@ -151,19 +152,19 @@ def _pieces(waveform: Waveform, n: int) -> tuple[Exact, ...]:
     for place in (float(rise - n), float(left - fall)):
         if 0.0 < place < 1.0 and min(abs(place - other) for other in places) > _SAME:
             places.append(place)
-    found = []
+    rows = []
     for low, high in itertools.pairwise(sorted(places)):
         wave = derivatives[bisect.bisect(breaks, low) - 1]
         if n + 0.5 * (low + high) < rise:
             wave = _ramped(wave, low, (n + _Extended(low)) / rise, 1 / (rise * _TWO_PI))
         elif left - 0.5 * (low + high) < fall:
             wave = _ramped(wave, low, (left - _Extended(low)) / fall, -1 / (fall * _TWO_PI))
-        found.append(_monotone_pieces(wave, fastest, low, high))
-    return tuple(map(np.concatenate, zip(*found, strict=True)))
+        rows.append(_monotone_pieces(wave, fastest, low, high))
+    return tuple(map(np.concatenate, zip(*rows, strict=True)))
 
 
 def _ramped(plain: Derivative, low: float, scale: Any, rate: Any) -> Derivative:
-    """A wave times its ramp, a straight line: `scale` at `low`, and of slope `rate` by phase."""
+    """Return a wave times its ramp, a line with the value `scale` at `low` and the slope `rate`."""
     return lambda u, order: (
         (scale + rate * (u - _Extended(low)) * _TWO_PI) * plain(u, order)
         + order * rate * plain(u, order - 1)
@@ -173,7 +174,10 @@ def _ramped(plain: Derivative, low: float, scale: Any, rate: Any) -> Derivative:
 def _monotone_pieces(
     derivative: Derivative, fastest: int, low: float, high: float
 ) -> tuple[Exact, ...]:
-    """The pieces between two places of a smooth wave: start, end, first, last, coefficients, in cycles."""
+    """Return the pieces between two places of a smooth wave.
+
+    They are arrays of start and end, in cycles, of first and last value, and of coefficients.
+    """
     zeros, turns, *_ = _sign_changes(derivative, 0, _edges(low, high, fastest))
     points = [low]
     for b in [*sorted(u for u in (*zeros, *turns) if u - low > _SAME and high - u > _SAME), high]:
@@ -197,7 +201,7 @@ def _monotone_pieces(
 
 @functools.lru_cache(maxsize=32)
 def wave_of(waveform: Waveform) -> Wave:
-    """The table of pieces of a waveform."""
+    """Return the table of pieces of a waveform."""
     cycles = waveform.cycles
     (*_, is_sine) = _period(waveform.plain)
     _, _, first, last, _ = plain = _pieces(waveform.plain, 0)
@@ -211,7 +215,10 @@ def wave_of(waveform: Waveform) -> Wave:
     repeats = cycles - lead - tail
     numbers = [*range(lead), *([lead] if repeats else []), *range(cycles - tail, cycles)]
     ramped = [n < waveform.ramp_in or n + 1 > cycles - waveform.ramp_out for n in numbers]
-    rows = [_pieces(waveform, n) if own else plain for n, own in zip(numbers, ramped, strict=True)]
+    rows = [
+        _pieces(waveform, n) if is_ramped else plain
+        for n, is_ramped in zip(numbers, ramped, strict=True)
+    ]
 
     counts = [len(row[0]) for row in rows]
     start, end, first, last, coefficients = map(np.concatenate, zip(*rows, strict=True))
@@ -221,14 +228,13 @@ def wave_of(waveform: Waveform) -> Wave:
         start=cycle + 2.0 * math.pi * start,
         end=cycle + 2.0 * math.pi * end,
         length=2.0 * math.pi * (end - start),
-        first=np.where(
-            np.abs(first - before) < _ROUNDING, before, first
-        ),  # two cycles' roundings are no jump
+        # a difference by rounding between two cycles is no jump
+        first=np.where(np.abs(first - before) < _ROUNDING, before, first),
         last=last,
         coefficients=coefficients,
-        arc=np.repeat([is_sine and not own for own in ramped], counts),
+        arc=np.repeat([is_sine and not is_ramped for is_ramped in ramped], counts),
     )
-    shape = [1 + n if own else 0 for n, own in enumerate(ramped)]
+    shape = [1 + n if is_ramped else 0 for n, is_ramped in enumerate(ramped)]
     return wave_of_pieces(table, np.cumsum([0, *counts]), shape, lead, repeats)
 
 
@@ -238,36 +244,41 @@ def path_of_waveform(waveform: Waveform) -> Path:
     return path_of(wave_of(waveform), recorded=False)
 
 
-#: Tables of pieces that are kept, and bytes of a sample in one and its path, about: a line through
-#: zero is two pieces.
+#: Tables of pieces that are kept, and approximate bytes of a sample in a table and its path: a line
+#: through zero is two pieces.
 MOST_TABLES = 16
 TABLE_BYTES = 280
 
 
 @functools.lru_cache(maxsize=MOST_TABLES)
 def wave_of_record(record: Record, polarity: float) -> Wave:
-    """The table of pieces of a record, a wave of straight lines: w in m/s², and time in place of the phase."""
+    """Return the table of pieces of a record, which are straight lines.
+
+    w is in m/s², and time stands in place of the phase.
+    """
     times = record.times
     values = polarity * record.acceleration
     spacing = spacing_of(times)
     change = np.diff(values)
     crosses = values[:-1] * np.sign(values[1:]) < 0.0
-    own = np.repeat(np.arange(spacing.size), 1 + crosses)  # a line through zero is two pieces
-    after = np.concatenate([[False], own[1:] == own[:-1]])
-    before = crosses[own] & ~after
-    first = np.where(after, 0.0, values[own])
-    last = np.where(before, 0.0, values[own + 1])
-    part = np.divide(last - first, change[own], out=np.ones(own.size), where=crosses[own])
-    length = spacing[own] * np.abs(part)
+    interval = np.repeat(np.arange(spacing.size), 1 + crosses)  # a line through zero is two pieces
+    after = np.concatenate([[False], interval[1:] == interval[:-1]])
+    before = crosses[interval] & ~after
+    first = np.where(after, 0.0, values[interval])
+    last = np.where(before, 0.0, values[interval + 1])
+    part = np.divide(
+        last - first, change[interval], out=np.ones(interval.size), where=crosses[interval]
+    )
+    length = spacing[interval] * np.abs(part)
     pieces = pieces_of(
-        start=np.where(after, times[own + 1] - length, times[own]),
-        end=np.where(before, times[own] + length, times[own + 1]),
+        start=np.where(after, times[interval + 1] - length, times[interval]),
+        end=np.where(before, times[interval] + length, times[interval + 1]),
         length=length,
         first=first,
         last=last,
-        coefficients=np.where(first == last, 0.0, (change / spacing)[own])[:, np.newaxis],
+        coefficients=np.where(first == last, 0.0, (change / spacing)[interval])[:, np.newaxis],
     )
-    return wave_of_pieces(pieces, cycle=[0, own.size], shape=[0])
+    return wave_of_pieces(pieces, cycle=[0, interval.size], shape=[0])
 
 
 @functools.lru_cache(maxsize=MOST_TABLES)

@@ -1,4 +1,4 @@
-"""Files that are not read, known by how they begin: archives, binary records, other texts."""
+"""Files that are not read, recognised by their beginnings: archives, binary records, texts."""
 
 import re
 from collections.abc import Sequence
@@ -7,7 +7,7 @@ _OBSPY = "read it with ObsPy, and give its traces, as accelerations, to Record.f
 _CONVERT = "write its times and accelerations as two columns of a CSV file"
 _UNPACK = "unpack it, and give the files that are in it"
 
-#: What files begin with that are no text: what they are, and what to do.
+#: First bytes of files that are no text, with the name of the format and the advice.
 _BINARY: tuple[tuple[bytes, str, str], ...] = (
     (
         rb"PK(?:\x03\x04|\x05\x06)(?s:.{0,4000})(?:xl/|\[Content_Types\])",
@@ -35,7 +35,7 @@ _BINARY: tuple[tuple[bytes, str, str], ...] = (
     (rb"(?s:.{304})(?:[\x06\x07]\x00\x00\x00|\x00\x00\x00[\x06\x07])", "a SAC file", _OBSPY),
 )
 
-#: The same of texts; patterns see the first lines.
+#: The same for texts: patterns for the first lines.
 _TEXTS: tuple[tuple[str, str, str], ...] = (
     (r"\s*(?:<!doctype html|<html)", "a web page, not the record itself", "load the file itself"),
     (r"\s*<\?xml", "an XML file", _CONVERT),
@@ -66,13 +66,13 @@ _TEXTS: tuple[tuple[str, str, str], ...] = (
     ),
 )
 
-#: Bytes that are looked at, and lines.
+#: Numbers of bytes and of lines that are examined.
 _BYTES = 4096
 _LINES = 15
 
 
 def binary_refusal(content: bytes) -> str | None:
-    """Return what a file is that holds no text, and what to do with it; None for text."""
+    """Return the format of a file that is no text, with the advice; None for text."""
     begin = content[:_BYTES]
     for pattern, name, advice in _BINARY:
         if re.match(pattern, begin):
@@ -83,7 +83,7 @@ def binary_refusal(content: bytes) -> str | None:
 
 
 def text_refusal(lines: Sequence[str]) -> str | None:
-    """Return the name of a format of records that is not read, and what to do; None for others."""
+    """Return a format of records that is not read, with the advice; None for others."""
     begin = "\n".join(lines[:_LINES])
     for pattern, name, advice in _TEXTS:
         if re.match(pattern, begin, re.IGNORECASE):

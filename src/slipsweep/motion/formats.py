@@ -1,4 +1,4 @@
-"""Formats of recorded motions whose headers say how they are read; plain text is read by `columns`.
+"""Formats of recorded motions that headers describe; plain text is read by `columns`.
 
 docs/records.md#files describes them.
 """
@@ -9,7 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from slipsweep.errors import InputError
-from slipsweep.model.parameters import LARGEST, check_choice
+from slipsweep.model.parameter_table import LARGEST
+from slipsweep.model.parameters import check_choice
 from slipsweep.motion.columns import chosen_channel, read_plain
 from slipsweep.motion.foreign import text_refusal
 from slipsweep.motion.headings import unit_said
@@ -29,7 +30,7 @@ _ASA_HEAD = r"ARCHIVO EST[AÁ]NDAR DE ACELERACI[OÓ]N|^INTERVALO DE MUESTREO,? C
 
 
 def read_samples(path: Path, lines: list[str], reading: Reading) -> tuple[str, Samples, str]:
-    """The name of a file's format, what it holds, and the unit of that (InputError: no record)."""
+    """Return the format of a file, its samples and their unit (InputError: it is no record)."""
     try:
         if refusal := text_refusal(lines):
             raise InputError(refusal)
@@ -54,7 +55,7 @@ def read_samples(path: Path, lines: list[str], reading: Reading) -> tuple[str, S
 
 
 def _unit_of(samples: Samples, reading: Reading) -> str:
-    """The unit of samples: the file's own, or the one that the user gives."""
+    """Return the unit of samples: that of the file, or the one that the user gives."""
     unit = samples.unit or reading.units
     if unit is None:
         raise InputError(
@@ -107,9 +108,9 @@ def _at2(lines: list[str], reading: Reading) -> Samples:
 def _esm(lines: list[str], reading: Reading) -> Samples:
     at = next((at for at, line in enumerate(lines) if ":" not in line), len(lines))
     header = "\n".join(lines[:at])
-    known = {"SAMPLING_INTERVAL_S": NUMBER, "NDATA": COUNT, "UNITS": r"(\S+)"}
+    fields = {"SAMPLING_INTERVAL_S": NUMBER, "NDATA": COUNT, "UNITS": r"(\S+)"}
     interval, points, unit = fields_in(
-        header, {name: rf"^{name}:\s*{known[name]}\s*$" for name in known}
+        header, {name: rf"^{name}:\s*{fields[name]}\s*$" for name in fields}
     )
     data_type = _field(header, "DATA_TYPE:") or "ACCELERATION"
     if data_type != "ACCELERATION":
@@ -124,12 +125,12 @@ def _esm(lines: list[str], reading: Reading) -> Samples:
 def _knet(lines: list[str], reading: Reading) -> Samples:
     at = next((at for at, line in enumerate(lines[:40]) if line.startswith("Memo")), 0)
     header = "\n".join(lines[:at])
-    known = {
+    fields = {
         "Sampling Freq(Hz)": NUMBER,
         "Duration Time(s)": NUMBER,
         "Scale Factor": rf"{NUMBER}\(gal\)/{NUMBER}",
     }
-    patterns = {name: rf"^{re.escape(name)}\s*{pattern}" for name, pattern in known.items()}
+    patterns = {name: rf"^{re.escape(name)}\s*{pattern}" for name, pattern in fields.items()}
     frequency, duration, gals, counts = map(float, fields_in(header, patterns))
     if not (0.0 < frequency < 1e6 and 0.0 < counts <= LARGEST and 0.0 < gals <= LARGEST):
         raise InputError(f"{frequency:g} Hz, {gals:g} gal, {counts:g} counts: must be > 0")
@@ -140,13 +141,13 @@ def _knet(lines: list[str], reading: Reading) -> Samples:
 
 
 def _field(header: str, name: str) -> str:
-    """A field of a header that need not be there."""
-    found = re.search(rf"(?m)^{re.escape(name)}[ \t]*(\S*)", header)
-    return found[1] if found else ""
+    """Return a field of a header, empty if it is not there."""
+    match = re.search(rf"(?m)^{re.escape(name)}[ \t]*(\S*)", header)
+    return match[1] if match else ""
 
 
 def _asa(lines: list[str], reading: Reading) -> Samples:
-    """A channel of a file of Mexican networks, the one that is asked for.
+    """Return the chosen channel of a file of Mexican networks.
 
     Archivo Estándar de Aceleración 2.0: a header of names and values, those of each channel between
     slashes, then the channels side by side in columns of a Fortran format, which may touch.
@@ -177,7 +178,7 @@ def _asa(lines: list[str], reading: Reading) -> Samples:
 
     rows = ((number, line) for number, line in enumerate(lines[at:], at + 1) if line.strip())
     values = numbers_in(rows, cells, f"{len(names)} accelerations").reshape(-1, len(names))
-    # one of the two is wrong in some files
+    # in some files one of the two is wrong
     durations = _asa_field(header, "DURACION DEL REGISTRO", NUMBER)
     points = _asa_field(header, "NUM. TOTAL DE MUESTRAS", COUNT)
     is_as_long = len(durations) > channel and (
@@ -190,7 +191,7 @@ def _asa(lines: list[str], reading: Reading) -> Samples:
 
 
 def _asa_data(lines: list[str]) -> int:
-    """Where the data begin: behind the second line of ---------+, or at the first line of numbers."""
+    """Return the first line of data: after two lines of ---------+, or the first of numbers."""
     rules = [at for at, line in enumerate(lines) if line.startswith("---------")]
     if len(rules) > 1:
         return rules[1] + 1
@@ -199,7 +200,7 @@ def _asa_data(lines: list[str]) -> int:
 
 
 def _asa_field(header: str, name: str, pattern: str) -> list[str]:
-    """The values of a field, one a channel: of C1-C6, and of C7-C12 where there are so many."""
+    """Return the values of a field for each channel, from the lines of C1-C6 and C7-C12."""
     texts = re.findall(rf"(?im)^{re.escape(name)}[^:\n]*:(.*)$", header)
     parts = [
         part.strip() for text in texts if text.strip() for part in text.strip(" \t/").split("/")
@@ -226,17 +227,18 @@ def _cosmos(lines: list[str], reading: Reading) -> Samples:
     read = (
         _cosmos_channel(lines[:end], at) for at, end in itertools.pairwise([*starts, len(lines)])
     )
-    channels = [one for one in read if one is not None]
+    channels = [channel for channel in read if channel is not None]
     number = reading.channel or 1
     if number > len(channels) or (reading.channel is None and len(channels) > 1):
         raise InputError(
-            f"channel = {reading.channel}: must be one of its {len(channels)} channels of acceleration"
+            f"channel = {reading.channel}: must be one of its {len(channels)} channels of "
+            "acceleration"
         )
     return channels[number - 1]
 
 
 def _cosmos_channel(lines: list[str], at: int) -> Samples | None:
-    """The channel that begins at a line and goes to the last one; None if it is no acceleration.
+    """Return the channel in the lines from one on; None if it is no acceleration.
 
     Lines of text, 100 integers, 100 reals, comments, then values in a Fortran format, without
     blanks between them. Integers 1 to 3 are the stage (1: uncorrected), the physical parameter (1:
@@ -248,7 +250,7 @@ def _cosmos_channel(lines: list[str], at: int) -> Samples | None:
         return fields_in("".join(lines[at : at + 1]), {what: pattern}, f"line {at + 1}")
 
     def section(what: str, pattern: str) -> tuple[int, Floats]:
-        """The line after the values of a section, and these."""
+        """Return the line after the values of a section, and the values."""
         count, each, width = (int(number or 1) for number in head(what, pattern))
         end = at + 1 + -(-count // (each or 1))
         column = f".{{1,{width or 1}}}"
@@ -268,7 +270,7 @@ def _cosmos_channel(lines: list[str], at: int) -> Samples | None:
     at += 1 + int(*head("number of comment lines", rf"^\s*{COUNT}\s+Comment line"))
     data = at
     at, values = section("number and format of values", _COSMOS_DATA)
-    # what a V2 file may have behind the acceleration is its velocity and displacement
+    # a V2 file may have velocity and displacement after the acceleration
     if not any(line.lstrip().lower().startswith("end-of-data") for line in lines[at:]):
         raise InputError("no line End-of-data after the values: cut off, or damaged")
     if whole[0] == 3:
@@ -285,7 +287,7 @@ def _cosmos_channel(lines: list[str], at: int) -> Samples | None:
 
 
 def _cosmos_unit(code: int, line: str) -> str:
-    """The unit of a code in the integer header, as the line says it that announces the values."""
+    """Return the unit of a code in the integer header, checked by the line before the values."""
     if code not in _COSMOS_UNITS:
         counts = ", counts of a digitizer (V0)" if code == 50 else ""
         raise InputError(
@@ -303,7 +305,7 @@ def _cosmos_unit(code: int, line: str) -> str:
 
 
 def _check_cosmos_length(times: Floats, whole: Floats, reals: Floats, line: str) -> None:
-    """Refuse a length of the record in the header that is not that of its samples."""
+    """Raise InputError if the length of the record in the header is not that of its samples."""
     interval = times[1] - times[0] if times.size > 1 else 0.0
     length = times.size * interval
     said = {"real 63": reals[62] if reals.size > 62 else 0.0}

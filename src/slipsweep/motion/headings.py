@@ -35,13 +35,13 @@ _OTHER_QUANTITIES = (
     r"|^p?sa\b"
 )
 
-#: What headings say of a motion or its site beside its samples.
+#: Quantities of a motion or its site that headings name beside its samples.
 _ASIDES = (
     r"(?:peak|max\w*\.?|initial|final|shear|wave|site)[\s_-]+(?:ground[\s_-]+|wave[\s_-]+)?"
     r"(?:vel|disp)\w*"
 )
 
-#: Marks of a vertical component: words of what a file says of it, and parts of a file's name.
+#: Marks of a vertical component: words in its description, and parts of the name of its file.
 _VERTICAL = {"UP", "U", "UD", "DU", "DN", "DWN", "DOWN", "V", "VER", "VRT", "VERT", "VERTICAL", "Z"}
 _VERTICAL |= {"UD1", "UD2", "ACCZ", "AZ"}
 _VERTICAL_CHANNEL = r"[B-FHLMSV][NGLH]Z"
@@ -57,21 +57,21 @@ class _Unit(NamedTuple):
 
 
 def unit_said(header: str, column: str = "") -> str | None:
-    """Return the unit that the heading of a column names, or else the whole header; None if none.
+    """Return the unit in the heading of a column, or else in the whole header; None: there is none.
 
-    InputError: it names another quantity than an acceleration, or a unit that is not read.
+    InputError: the heading names another quantity than an acceleration, or an unknown unit.
     """
-    found = _first(_in_name(column)) or _first(_in_units_line(header)) or _first(_in_text(header))
+    unit = _first(_in_name(column)) or _first(_in_units_line(header)) or _first(_in_text(header))
     words = re.search(_OTHER_QUANTITIES, column, re.IGNORECASE)
     words = words or re.search(_SPECTRAL, header, re.IGNORECASE)
-    if words is None and not (found and found.quantity == "acceleration"):
+    if words is None and not (unit and unit.quantity == "acceleration"):
         text = re.sub(_ASIDES, "", header, flags=re.IGNORECASE)
         if not re.search(_ACCELERATION, f"{header}\n{column}", re.IGNORECASE):
             words = re.search(_OTHER_QUANTITIES, text, re.IGNORECASE)
-    if words is None and (found is None or found.unit is not None):
-        return found.unit if found else None
+    if words is None and (unit is None or unit.unit is not None):
+        return unit.unit if unit else None
     said = " in ".join(
-        dict.fromkeys(part for part in (words and words[0], found and found.text) if part)
+        dict.fromkeys(part for part in (words and words[0], unit and unit.text) if part)
     )
     raise InputError(
         f"its heading says {said!r}: must be an acceleration in one of {', '.join(UNITS)}"
@@ -79,11 +79,11 @@ def unit_said(header: str, column: str = "") -> str | None:
 
 
 def vertical_mark(component: str, path: Path | None = None) -> str | None:
-    """Return what in a component's text, or in the name of its file, says that it is vertical."""
+    """Return the mark of a vertical component in its description, or in the name of its file."""
     words = re.split(r"[^A-Z0-9]+", re.sub(r"\bU[-/]D\b", "UD", component.upper()))
-    found = [one for one in words if one in _VERTICAL or re.fullmatch(_VERTICAL_CHANNEL, one)]
-    if found or path is None:
-        return found[0] if found else None
+    marks = [word for word in words if word in _VERTICAL or re.fullmatch(_VERTICAL_CHANNEL, word)]
+    if marks or path is None:
+        return marks[0] if marks else None
     name = re.sub(r"\bU-D\b|(?<=_)U-D\b", "UD", path.name)
     parts = [part for part in re.split(r"[._\-\s]+", name) if part]
     ends = [part.upper() for part in (*parts[-1:], *parts[-2:-1])]
@@ -100,23 +100,23 @@ def is_unit(text: str) -> bool:
 
 
 def _first(candidates: Iterator[tuple[str, bool]]) -> _Unit | None:
-    """The first unit among texts, of an acceleration if there is one.
+    """Return the first unit among texts, of an acceleration if there is one.
 
-    A unit of length is one only where the text stands for a unit anyhow.
+    Each text has a mark: True if a unit of length may be taken for one there.
     """
-    found = []
+    units = []
     for text, may_be_length in candidates:
         plain = _plain(text)
         if plain in _SPELLINGS:
-            found.append(_Unit(text.strip(), "acceleration", _SPELLINGS[plain]))
+            units.append(_Unit(text.strip(), "acceleration", _SPELLINGS[plain]))
         for quantity, pattern in _OTHER_UNITS.items():
             if re.fullmatch(pattern, plain) and (may_be_length or quantity != "displacement"):
-                found.append(_Unit(text.strip(), quantity, None))
-    return min(found, key=lambda unit: unit.quantity != "acceleration", default=None)
+                units.append(_Unit(text.strip(), quantity, None))
+    return min(units, key=lambda unit: unit.quantity != "acceleration", default=None)
 
 
 def _plain(text: str) -> str:
-    """A unit as it is compared: cm/sec/sec, CM/S**2, cm s^-2 and cm/s² are all cm/s2."""
+    """Return a unit in one spelling: cm/sec/sec, CM/S**2, cm s^-2 and cm/s² are all cm/s2."""
     plain = re.sub(r"[\s^*·'\"]", "", text.lower()).translate(str.maketrans("²−µμ", "2-uu"))
     plain = re.sub(r"se[cg](?:onds?|undos?)?", "s", plain)
     plain = re.sub(r"s-([12])", r"/s\1", plain).replace("//", "/").replace("/s1", "/s")
@@ -128,7 +128,7 @@ def _brackets(text: str) -> list[str]:
 
 
 def _in_name(name: str) -> Iterator[tuple[str, bool]]:
-    """Texts of a column's name that may be its unit: in brackets, all of it, or its last words."""
+    """Yield texts in a column's name that may be its unit: in brackets, all of it, last words."""
     yield from ((text, True) for text in _brackets(name))
     yield name, False
     words = re.split(r"[\s,:;=_]+", re.sub(r"[(\[].*?[)\]]", " ", name).strip())
@@ -137,17 +137,17 @@ def _in_name(name: str) -> Iterator[tuple[str, bool]]:
 
 
 def _in_units_line(header: str) -> Iterator[tuple[str, bool]]:
-    """Texts behind the word "units" in a header."""
+    """Yield texts behind the word "units" in a header."""
     for line in header.splitlines():
-        if found := re.search(r"(?i)(?:units?|unidad(?:es)?|einheit(?:en)?)\b(.*)", line):
-            words = re.split(r"[\s,:;=]+", found[1])
+        if match := re.search(r"(?i)(?:units?|unidad(?:es)?|einheit(?:en)?)\b(.*)", line):
+            words = re.split(r"[\s,:;=]+", match[1])
             bare = [re.sub(r"\(.*", "", word).rstrip(".") for word in words]
-            texts = (*(word for word in bare if word.lower() != "in"), *_brackets(found[1]))
+            texts = (*(word for word in bare if word.lower() != "in"), *_brackets(match[1]))
             yield from ((text, True) for text in texts if text)
 
 
 def _in_text(header: str) -> Iterator[tuple[str, bool]]:
-    """Texts of a header's lines, the last first, that may be a unit."""
+    """Yield texts in the lines of a header, the last line first, that may be a unit."""
     for line in header.splitlines()[::-1]:
         yield from ((text, False) for text in _brackets(line))
         words = re.findall(r"(?i)\bin\s+(\S+)", line)
@@ -159,5 +159,5 @@ def _in_text(header: str) -> Iterator[tuple[str, bool]]:
 
 
 def is_sentence(line: str) -> bool:
-    """Return True if a line of a header gives a value, or a date, and so is no name of a column."""
+    """Return True if a line of a header has a value or a date, so that it names no column."""
     return bool(re.search(r"[=:]|(?<![\w^*/-])\d", line))

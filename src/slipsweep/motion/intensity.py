@@ -1,10 +1,10 @@
 """Intensity measures of a recorded motion, by the definitions of the literature.
 
-Acceleration is interpolated linearly between samples, and v = d = 0 at the first one: velocity is
-then a parabola on each interval and displacement a cubic, and every integral and extreme below is
-theirs, exact to rounding, at any sampling, even or not.  (The mean period alone is defined by a
-discrete Fourier transform.)  Nothing is taken off the acceleration but what `baseline` took off
-when it was read.  "g" is standard gravity.
+Acceleration is interpolated linearly between samples, and v = d = 0 at the first one.  Velocity is
+then a parabola on each interval, and displacement a cubic, so that all integrals and extremes are
+exact to rounding, also with uneven sampling.  (Only the mean period is defined by a discrete
+Fourier transform.)  Nothing is subtracted from the acceleration beside the `baseline` at reading.
+"g" is standard gravity.
 """
 
 import math
@@ -21,17 +21,21 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-#: Frequencies that the mean period is of, Hz, and their largest spacing (Rathje et al. 1998, 2004).
+#: Least and largest frequency in the mean period, and largest spacing, Hz (Rathje et al. 1998,
+#: 2004).
 _LOWEST = 0.25
 _HIGHEST = 20.0
 _SPACING = 0.05
 
-#: Sampling of a motion whose own is not even, s.
+#: Largest sampling interval, s, at which an unevenly sampled motion is sampled anew.
 _RESAMPLED = 0.005
 
 
 def intensity_measures(times: Floats, acceleration: Floats) -> dict[str, float]:
-    """All of `variables.INTENSITY_MEASURES`, of samples of acceleration (m/s²); NaN where one is not defined."""
+    """Return all of `variables.INTENSITY_MEASURES`; NaN if one is not defined.
+
+    `times` are in s, `acceleration` in m/s².
+    """
     return {
         "pga": float(np.abs(acceleration).max()),
         "pgv": peak_velocity(times, acceleration),
@@ -43,23 +47,22 @@ def intensity_measures(times: Floats, acceleration: Floats) -> dict[str, float]:
     }
 
 
-def strength_factor(times: Floats, acceleration: Floats, given: Mapping[str, Any]) -> Any:
-    """What the acceleration of a record is multiplied by, for the strength that is given, and `time_scale`.
+def strength_factor(times: Floats, acceleration: Floats, inputs: Mapping[str, Any]) -> Any:
+    """Return the factor on the acceleration of a record for the strength in `inputs`.
 
     The strength is one of `scale`, `amplitude` (m/s²), `pgv` (m/s) and `arias_intensity` (m/s).
-    The last two grow with the time scale: the target is that of the motion as it shakes the base.
+    The last two grow with the time scale; they are those of the motion after `time_scale`.
     """
-    with np.errstate(
-        divide="ignore", invalid="ignore"
-    ):  # of a motion that is zero throughout: refused by name
-        if "scale" in given:
-            return given["scale"]
-        if "amplitude" in given:
-            return given["amplitude"] / np.abs(acceleration).max()
-        if "pgv" in given:
-            return given["pgv"] / (peak_velocity(times, acceleration) * given["time_scale"])
-        own = np.float64(arias_intensity(times, acceleration))
-        return np.sqrt(given["arias_intensity"] / (own * given["time_scale"]))
+    # a motion that is zero throughout is refused elsewhere, by its name
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if "scale" in inputs:
+            return inputs["scale"]
+        if "amplitude" in inputs:
+            return inputs["amplitude"] / np.abs(acceleration).max()
+        if "pgv" in inputs:
+            return inputs["pgv"] / (peak_velocity(times, acceleration) * inputs["time_scale"])
+        recorded = np.float64(arias_intensity(times, acceleration))
+        return np.sqrt(inputs["arias_intensity"] / (recorded * inputs["time_scale"]))
 
 
 def peak_velocity(times: Floats, acceleration: Floats) -> float:
@@ -108,12 +111,12 @@ def significant_duration(times: Floats, acceleration: Floats) -> float:
 
 
 def mean_period(times: Floats, acceleration: Floats) -> float:
-    """Mean period Tm = Σ Cᵢ²/fᵢ / Σ Cᵢ², s, over 0.25 Hz ≤ fᵢ ≤ 20 Hz (Rathje, Abrahamson and Bray 1998).
+    """Mean period Tm = Σ Cᵢ²/fᵢ / Σ Cᵢ², s, over 0.25 Hz ≤ fᵢ ≤ 20 Hz (Rathje et al. 1998).
 
     Cᵢ are the amplitudes of the discrete Fourier transform, at frequencies at most 0.05 Hz apart: a
-    motion shorter than 20 s is continued with zeros (Rathje et al. 2004).  One that is not evenly
-    sampled is sampled anew, at its median interval or, if that is longer, every 0.005 s.  NaN of a
-    motion without such frequencies.
+    motion shorter than 20 s is continued with zeros (Rathje et al. 2004).  A motion that is not
+    evenly sampled is sampled anew, at its median interval or, if that is longer, every 0.005 s.
+    NaN if the motion has no such frequencies.
     """
     spacing = spacing_of(times)
     step = (
@@ -128,30 +131,28 @@ def mean_period(times: Floats, acceleration: Floats) -> float:
 
 
 def spacing_of(times: Floats) -> Floats:
-    """The intervals between samples: one, where the times are its multiples to rounding.
+    """Return the intervals between samples; all are equal if the times are even to rounding.
 
-    Differences of times have the rounding of the times, 1e-10 of an interval after a million
+    Differences of times would have the rounding of the times, 1e-10 of an interval after a million
     samples.
     """
     even = np.linspace(times[0], times[-1], times.size)
     is_even = np.abs(times - even).max() <= 2.0 * np.spacing(np.abs(times).max())
-    return (
-        np.full(times.size - 1, (times[-1] - times[0]) / (times.size - 1))
-        if is_even
-        else np.diff(times)
-    )
+    if is_even:
+        return np.full(times.size - 1, (times[-1] - times[0]) / (times.size - 1))
+    return np.diff(times)
 
 
 def _lines(times: Floats, acceleration: Floats) -> "PPoly":
-    """The straight lines between the samples."""
-    from scipy.interpolate import PPoly  # only here: a sweep under a waveform does not wait for it
+    """Return the straight lines between the samples."""
+    from scipy.interpolate import PPoly  # imported late: a sweep under a waveform does without
 
     slope = np.diff(acceleration) / np.diff(times)
     return PPoly(np.array([slope, acceleration[:-1]]), times)
 
 
 def _energy(times: Floats, acceleration: Floats) -> "PPoly":
-    """∫ Üg² dt over time."""
+    """Return ∫ Üg² dt as a function of time."""
     lines = _lines(times, acceleration)
     slope, first = lines.c
     return type(lines)(
@@ -160,9 +161,9 @@ def _energy(times: Floats, acceleration: Floats) -> "PPoly":
 
 
 def _zeros(curve: "PPoly") -> Floats:
-    """Return where a curve is zero; a piece that is zero throughout has none."""
-    found: Floats = curve.roots(discontinuity=False, extrapolate=False)
-    return found[np.isfinite(found)]
+    """Return the zeros of a curve; a piece that is zero throughout has none."""
+    roots: Floats = curve.roots(discontinuity=False, extrapolate=False)
+    return roots[np.isfinite(roots)]
 
 
 def _largest(curve: "PPoly", derivative: "PPoly") -> float:

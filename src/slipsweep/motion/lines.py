@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from slipsweep.errors import InputError
-from slipsweep.model.parameters import LARGEST, shown
+from slipsweep.model.parameter_table import LARGEST
+from slipsweep.model.parameters import shown
 from slipsweep.motion.foreign import binary_refusal
 from slipsweep.motion.intensity import Floats
 
@@ -27,7 +28,7 @@ class Samples(NamedTuple):
 
 
 def read_lines(path: Path) -> tuple[str, list[str]]:
-    """The SHA-256 of a file, and its lines (InputError: it cannot be read, or is no text)."""
+    """Return the SHA-256 of a file, and its lines (InputError: it is not readable as text)."""
     try:
         content = path.read_bytes()
     except (OSError, ValueError) as error:  # ValueError: a name that no system has
@@ -39,20 +40,23 @@ def read_lines(path: Path) -> tuple[str, list[str]]:
     try:
         text = content.decode("utf-8-sig")  # some editors put a byte-order mark in front
     except UnicodeDecodeError:
-        text = content.decode("latin-1")  # m/s² of old files; their names matter to nobody
+        text = content.decode("latin-1")  # old files, for example with m/s²
     return hashlib.sha256(content).hexdigest(), text.splitlines()
 
 
 def fields_in(header: str, patterns: Mapping[str, str], where: str = "its header") -> list[str]:
-    """What patterns, by the names that errors have, find in a header (InputError: nothing)."""
+    """Return the groups that patterns match in a header.
+
+    InputError: one does not match; the message has its name.
+    """
     fields: list[str] = []
     for name, pattern in patterns.items():
-        found = re.search(pattern, header, re.MULTILINE | re.IGNORECASE | re.ASCII)
-        if found is None:
+        match = re.search(pattern, header, re.MULTILINE | re.IGNORECASE | re.ASCII)
+        if match is None:
             raise InputError(
                 f"no {name} in {where}, or none that can be read: another format, or damaged"
             )
-        fields += found.groups()
+        fields += match.groups()
     return fields
 
 
@@ -62,7 +66,7 @@ def numbers_in(
     what: str = "numbers",
     where: str = "",
 ) -> Floats:
-    """All numbers in the cells of numbered lines, in their order."""
+    """Return all numbers in the cells of numbered lines, in their order."""
     values: list[float] = []
     for number, line in rows:
         try:
@@ -73,14 +77,14 @@ def numbers_in(
 
 
 def even_times(count: int, interval: float) -> Floats:
-    """Times of so many samples at a constant interval, s (InputError: it is no interval)."""
+    """Return the times of samples at a constant interval, s (InputError: it is not positive)."""
     if not 0.0 < interval <= LARGEST:
         raise InputError(f"sampling interval {interval:g}: must be a finite number > 0")
     return np.arange(count, dtype=np.float64) * interval
 
 
 def check_count(values: Floats, announced: int) -> None:
-    """Refuse another number of values than a header says."""
+    """Raise InputError if there are more or fewer values than a header announces."""
     if values.size != announced:
         raise InputError(
             f"{values.size} accelerations, where its header says {announced}: cut off, or damaged"
@@ -93,13 +97,14 @@ def read_columns(
     holds: Callable[[str, set[str], str], tuple[str, float] | None],
     names: dict[str, str],
 ) -> dict[str, Floats]:
-    """Columns of numbers, by what they hold and in its unit; a blank cell is NaN.
+    """Return columns of numbers, by the quantity that each holds; a blank cell is NaN.
 
-    The first line that is not blank and does not begin with ``#`` names the columns.  Separators
-    are tabs, semicolons or commas: the first of these that is in it.  Commas that do not separate
-    are decimal. ``holds(name, words, unit)`` gives what a column holds, from the words of its name
-    and the unit in brackets behind them, and the factor to its unit; None leaves it out.  What has
-    one of `names` must be there, under such a name.  InputError: the line, and why.
+    The first line that is not blank and does not begin with ``#`` names the columns.  The separator
+    is the first of tab, semicolon and comma that is in it.  Commas that do not separate are
+    decimal.  ``holds(name, words, unit)`` returns the quantity in a column, and the factor to its
+    SI unit, from the words of its name and the unit in brackets; None leaves the column out.  The
+    quantities in `names` must be there; errors show these names as examples.  InputError: the line,
+    and the reason.
     """
     rows = [
         (number, line)
@@ -107,16 +112,16 @@ def read_columns(
         if line.strip() and not line.startswith("#")
     ]
     number, header = rows[0] if rows else (1, "")
-    separator = next((one for one in "\t;," if one in header), ",")
+    separator = next((character for character in "\t;," if character in header), ",")
     cells = [cell.strip(' "') for cell in header.split(separator)]
     columns: list[tuple[str, int, float]] = []
     for at, name in enumerate(cells):
         text, _, unit = name.replace("[", "(").partition("(")
         if held := holds(name, {*re.split(r"[\s_\-]+", text.strip().lower())}, unit.strip(" )]")):
             columns.append((held[0], at, held[1]))
-    found = [what for what, *_ in columns]
-    for what in (*names, *found):
-        if (count := found.count(what)) != 1:
+    held_names = [what for what, *_ in columns]
+    for what in (*names, *held_names):
+        if (count := held_names.count(what)) != 1:
             example = ", ".join(names.values())
             raise InputError(
                 f"{path}: line {number}: {count} columns of {what}: must be one, as in {example}"
@@ -128,7 +133,7 @@ def read_columns(
             raise ValueError
         return [texts[at] for _, at, _ in columns]
 
-    rule = f"{len(cells)} cells, and a number, or nothing, for {', '.join(found)}"
+    rule = f"{len(cells)} cells, and a number, or nothing, for {', '.join(held_names)}"
     table = numbers_in(rows[1:], chosen, rule, f"{path}: ").reshape(-1, len(columns))
     return {
         what: factor * values for (what, _, factor), values in zip(columns, table.T, strict=True)

@@ -40,9 +40,13 @@ PIECE = np.dtype(
                 # its number, and that of its curve
                 ("number", np.int64),
                 ("curve", np.int64),
+                # the last piece of the rise that it belongs to, which goes on without a jump
+                ("rise_end", np.int64),
                 # w jumps up at its beginning; it is a quarter of a sine about its peak
                 ("jumps", np.bool_),
                 ("arc", np.bool_),
+                # w > 0 jumps up at its beginning, stays there, or rises after a fall
+                ("resets_held", np.bool_),
             ],
             align=True,
         ),
@@ -69,8 +73,14 @@ CURVE = np.dtype(
 #: A cycle: its first piece, and a number that it shares with cycles of the same pieces.
 CYCLE = np.dtype((np.record, [("first", np.int64), ("shape", np.int64)]))
 
-#: A run of pieces with w > 0: the first of them, the first after them, and the largest w.
-INTERVAL = np.dtype((np.record, [("first", np.int64), ("end", np.int64), ("height", np.float64)]))
+#: A run of pieces with w > 0: the first of them, the first after them, the first after the negative
+#: half wave that follows at once (a sample of 0 within it does not end it), and the largest w.
+INTERVAL = np.dtype(
+    (
+        np.record,
+        [("first", np.int64), ("end", np.int64), ("next_end", np.int64), ("height", np.float64)],
+    )
+)
 
 
 class Base(NamedTuple):
@@ -108,6 +118,8 @@ def path_of(wave: Wave, recorded: bool) -> Path:
     pieces["arc"] = wave.pieces["arc"]
     pieces["slope"] = wave.pieces["coefficients"][:, 0]
     pieces["number"] = np.arange(pieces.size)
+    pieces["rise_end"] = _ends_of_rises(wave.pieces)
+    pieces["resets_held"] = _reset_held(wave.pieces)
     curved = np.flatnonzero(pieces["degree"] > 1)
     pieces["curve"][curved] = np.arange(curved.size)
     curves = np.zeros(max(curved.size, 1), CURVE)
@@ -117,6 +129,8 @@ def path_of(wave: Wave, recorded: bool) -> Path:
     intervals = np.zeros(wave.height.size, INTERVAL)
     intervals["first"] = wave.interval[:, 0]
     intervals["end"] = wave.interval[:, 1]
+    above = np.append(np.flatnonzero(pieces["top"] >= 0.0), pieces.size)
+    intervals["next_end"] = above[np.searchsorted(above, intervals["end"])]
     intervals["height"] = wave.height
     after = wave.shape[wave.lead :]
     alike = 0
@@ -160,21 +174,41 @@ def _fill_whole(curves: np.ndarray, pieces: np.ndarray) -> None:
         curve["whole_twice"] = moment - before * (finish - begin)
 
 
+def _ends_of_rises(pieces: np.ndarray) -> np.ndarray:
+    """Return the number of the last piece of the rise that each piece belongs to."""
+    first = pieces["first"]
+    last = pieces["last"]
+    goes_on = (first < last)[:-1] & (last[:-1] == first[1:]) & (first < last)[1:]
+    ends = np.append(np.flatnonzero(~goes_on), last.size - 1)
+    last_pieces: np.ndarray = ends[np.searchsorted(ends, np.arange(last.size))]
+    return last_pieces
+
+
+def _reset_held(pieces: np.ndarray) -> np.ndarray:
+    """Return where the base jumps up to w > 0, stays there, or rises after a fall."""
+    first = pieces["first"]
+    last = pieces["last"]
+    fell = np.append(False, first[:-1] > last[:-1])
+    stays = (first > 0.0) & (first == last)
+    resets: np.ndarray = pieces["jumps"] | stays | (fell & (first > 0.0) & (first < last))
+    return resets
+
+
 def _rises(pieces: np.ndarray) -> np.ndarray:
     """Return the ranges of w > 0 that the base rises through, each as large as possible."""
     rising = (pieces["top"] > 0.0) & ((pieces["last"] >= pieces["first"]) | pieces["jumps"])
-    ranges: list[list[float]] = []
-    lows = np.where(
-        pieces["jumps"] & (pieces["last"] < pieces["first"]), pieces["top"], pieces["first"]
-    )
-    for low, high in sorted(
-        {*zip(lows[rising].tolist(), pieces["top"][rising].tolist(), strict=True)}
-    ):
-        if ranges and low <= ranges[-1][1]:
-            ranges[-1][1] = max(ranges[-1][1], high)
-        else:
-            ranges.append([low, high])
-    return np.array(ranges, np.float64).reshape(-1, 2)
+    if not rising.any():
+        return np.empty((0, 2))
+    falls = pieces["jumps"] & (pieces["last"] < pieces["first"])
+    lows = np.where(falls, pieces["top"], pieces["first"])[rising]
+    highs = pieces["top"][rising]
+    order = np.argsort(lows)
+    lows = lows[order]
+    reached = np.maximum.accumulate(highs[order])
+    parted = lows[1:] > reached[:-1]
+    starts = lows[np.append(True, parted)]
+    ends = reached[np.append(parted, True)]
+    return np.column_stack([starts, ends])
 
 
 def values_at(path: Path, phases: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -193,9 +227,10 @@ def values_at(path: Path, phases: NDArray[np.float64]) -> NDArray[np.float64]:
     begin = pieces["begin"][p]
     tau = np.clip(begin + (inside - pieces["start"][p]), begin, pieces["finish"][p])
     offset = pieces["slope"][p] * tau
-    curved = pieces["degree"][p] > 1
-    offset[curved] = 0.0
-    for coefficient in path.base.curves["coefficients"][pieces["curve"][p][curved]].T[::-1]:
-        offset[curved] = (offset[curved] + coefficient) * tau[curved]
+    curved = np.flatnonzero(pieces["degree"][p] > 1)
+    if curved.size:
+        offset[curved] = 0.0
+        for coefficient in path.base.curves["coefficients"][pieces["curve"][p[curved]]].T[::-1]:
+            offset[curved] = (offset[curved] + coefficient) * tau[curved]
     shaken = (pieces["start"][0] <= inside) & (inside < pieces["end"][-1])
     return np.where(shaken, pieces["top"][p] + offset, 0.0)

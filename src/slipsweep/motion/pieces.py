@@ -1,4 +1,4 @@
-"""The table of pieces that every motion of the base ends as.
+"""The table of pieces that is made of every motion of the base.
 
 `slipsweep.motion.cutting` cuts waveforms and records into pieces, `slipsweep.kernels.base`
 evaluates them.
@@ -46,7 +46,9 @@ def pieces_of(
     coefficients: NDArray[Any],
     arc: NDArray[Any] | bool = False,
 ) -> np.ndarray:
-    """The table of pieces.  On one of them w = top + c₁τ + c₂τ² + …, τ from its anchor, its end where |w| is larger.
+    """Return the table of pieces.
+
+    On a piece w = top + c₁τ + c₂τ² + …, with τ from its anchor, the end at which |w| is larger.
 
     `length` is without the rounding of `start` and `end`, and `arc` whether a piece may be one.
     """
@@ -80,7 +82,7 @@ def pieces_of(
 def wave_of_pieces(
     pieces: np.ndarray, cycle: ArrayLike, shape: ArrayLike, lead: int = 0, repeats: int = 0
 ) -> Wave:
-    """The wave of a table of pieces; an interval that touches zero ends."""
+    """Return the wave of a table of pieces; an interval ends where it touches zero."""
     first = pieces["first"]
     last = pieces["last"]
     above = first + last > 0.0

@@ -1,11 +1,11 @@
-"""How a recorded motion is read, as a user chooses it; apart from `formats`: the help of commands loads no NumPy."""
+"""Options for reading recorded motions; without NumPy, which the help of commands need not load."""
 
 from dataclasses import dataclass
 from typing import ClassVar, Literal, TypeAlias
 
 from slipsweep.model.choices import Choice, option
 
-#: Standard gravity, m/s²: what "g" means in a record, whatever gravity a sweep takes.
+#: Standard gravity, m/s²: the unit "g" of a record, whatever gravity a sweep has.
 STANDARD_GRAVITY = 9.80665
 
 #: Units of a recorded acceleration, in m/s².
@@ -23,7 +23,7 @@ Vertical: TypeAlias = Literal["leave_out", "accept"]
 
 @dataclass(frozen=True)
 class Reading(Choice):
-    """How a file of a record is read."""
+    """Options for reading the file of a record."""
 
     name: ClassVar[str] = "reading"
     units: Unit | None = option("unit of the file's accelerations, if it does not name it", None)

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from slipsweep.errors import InputError
-from slipsweep.model.parameters import LARGEST, check_choice, check_numbers, check_single, shown
+from slipsweep.model.parameter_table import LARGEST
+from slipsweep.model.parameters import check_choice, check_numbers, check_single, shown
 from slipsweep.motion import formats
 from slipsweep.motion.headings import vertical_mark
 from slipsweep.motion.intensity import Floats, peak_displacement, peak_velocity
@@ -25,38 +26,38 @@ from slipsweep.motion.reading import (
     Unit,
 )
 
-#: An interval of more median ones than this is a gap.  Of fewer samples than the second, typed by
-#: hand, nothing is said but of values that cannot be.
+#: An interval of more than so many medians is a gap.
 _GAP = 5.0
+
+#: Shorter records are typed by hand, and checked for impossible values only.
 _FEWEST = 16
 
-#: Magnitudes that programs write where they have no value.
+#: Magnitudes that programs write for missing values.
 _FILL = np.array(
     [999.0, 9999.0, 99999.0, 999999.0, 999.9, 999.99, 9999.9, 9999.99, 32767.0, 32768.0, 1e20, 1e30]
 )
 
-#: A value that is held for so long (s, and samples) while the ground shakes is of a sensor that
-#: stands still.
+#: A sensor is stuck if it holds a value for so long (s, and samples) while the ground shakes.
 _HELD = 0.5
 _HELD_SAMPLES = 20
 
-#: Peaks that were recorded lie between these, g: the largest ever are 2.7 horizontally, 4
+#: Range of peaks that are plausible, g: the largest ever recorded are 2.7 horizontally and 4
 #: vertically.
 _WEAKEST = 0.001
 _STRONGEST = 3.0
 
-#: A record is flat at its largest or smallest value, as if clipped, where so many samples in a row
-#: have it, the one before or after is more than so many of the smallest steps away, and the value
-#: is more than this share of the peak.
+#: A record looks clipped if so many samples in a row have its largest or smallest value, the sample
+#: before or after differs by more than so many of the smallest steps, and the value is more than
+#: this share of the peak.
 _FLAT_SAMPLES = 3
 _FLAT_STEPS = 2.0
 _FLAT_SHARE = 0.1
 
-#: Share of samples that are exactly 0 from which a record is said to have them.
+#: Share of samples that are exactly 0 from which on a record has a caution.
 _ZEROS = 0.4
 
-#: Displacement of the ground (m) that is a drift where the velocity at the end is more than a share
-#: of the peak's, and one that is a drift anyhow: the largest along a fault are 9.
+#: Displacement of the ground (m) that is a drift if the velocity at the end is more than a share of
+#: the peak velocity, and displacement that is always a drift: the largest along a fault are 9 m.
 _DRIFT = 2.0
 _DRIFT_VELOCITY = 0.05
 _LARGEST_DISPLACEMENT = 10.0
@@ -73,9 +74,9 @@ class Record:
     acceleration : ndarray
         Horizontal acceleration of the base, m/s².
     name : str
-        What the record is called in results.
+        Name of the record in results.
     attrs : dict
-        How it was read, for the attributes of results.
+        Attributes for results, such as the format and the unit of its file.
 
     Raises
     ------
@@ -131,13 +132,10 @@ class Record:
 
     @classmethod
     def sampled(cls, acceleration: ArrayLike, interval: float, name: str = "record") -> "Record":
-        """Samples of acceleration (m/s²) at a constant interval (s) from t = 0 on."""
+        """Return a record of acceleration (m/s²) at a constant interval (s) from t = 0 on."""
         values = check_numbers("acceleration", acceleration)
-        return cls(
-            check_single("interval", interval) * np.arange(values.size, dtype=np.float64),
-            values,
-            name,
-        )
+        step = check_single("interval", interval)
+        return cls(step * np.arange(values.size, dtype=np.float64), values, name)
 
     @classmethod
     def from_obspy(
@@ -150,11 +148,11 @@ class Record:
         gaps: Gaps = "refuse",
         implausible: Implausible = "refuse",
     ) -> "Record":
-        """The record in a trace of ObsPy, which reads miniSEED, SAC and some forty other formats.
+        """Return the record in a trace of ObsPy, which reads miniSEED, SAC and other formats.
 
-        `units` is that of the trace's data, which must be accelerations, not counts; masked samples
-        are missing. The record's name is by default the trace's `id`.  The other arguments, and
-        InputError, are as `read_record`.
+        `units` is the unit of the trace's data, which must be accelerations, not counts; masked
+        samples are missing.  The name is by default the trace's `id`.  The other arguments, and
+        InputError, are those of `read_record`.
 
         Examples
         --------
@@ -168,16 +166,17 @@ class Record:
         try:
             data = trace.data
             interval = check_single("interval", trace.stats.delta)
-            own = name or str(trace.id)
+            record_name = name or str(trace.id)
         except AttributeError:
             raise InputError(
                 f"trace = {shown(trace)}: must be a Trace of ObsPy, one of those in a Stream"
             ) from None
         check_choice("units", units, tuple(UNITS))
         if np.asarray(data).dtype.kind in "iu":
-            counts = f"{own}: its data are whole numbers, counts of a digitizer"
+            counts = f"{record_name}: its data are whole numbers, counts of a digitizer"
             raise InputError(
-                f"{counts}: must be accelerations, such as trace.remove_response(output='ACC') leaves"
+                f"{counts}: must be accelerations, such as trace.remove_response(output='ACC') "
+                "leaves"
             )
         values = check_numbers("trace.data", np.ma.filled(data, np.nan))
         times = interval * np.arange(values.size, dtype=np.float64)
@@ -185,10 +184,13 @@ class Record:
         attrs = {"record_format": "obspy"}
         if vertical := vertical_mark(str(trace.id).rpartition(".")[2]):  # the channel's code
             attrs["record_vertical"] = vertical
-        return _inspected(own, times, values, units, reading, attrs)
+        return _inspected(record_name, times, values, units, reading, attrs)
 
     def corrected(self, baseline: Baseline) -> "Record":
-        """The record less a constant ("mean") or a straight line ("linear", least squares); "none" leaves it."""
+        """Return the record less its mean, or less a straight line fitted by least squares.
+
+        `baseline` is "mean" or "linear"; "none" changes nothing.
+        """
         degrees = {"none": None, "mean": 0, "linear": 1}
         values = self.acceleration
         if (degree := degrees[check_choice("baseline", baseline, degrees)]) is not None:
@@ -196,7 +198,7 @@ class Record:
         return replace(self, acceleration=values, attrs=self.attrs | {"baseline": baseline})
 
     def summary(self) -> str:
-        """One line: duration, interval, peak ground acceleration and velocity, unit, cautions.
+        """Return a line: duration, interval, peak acceleration and velocity, unit, cautions.
 
         Examples
         --------
@@ -214,19 +216,25 @@ class Record:
         )
         sampled = f"{np.ptp(self.times):.4g} s at {np.median(np.diff(self.times)):.4g} s"
         velocity = peak_velocity(self.times, self.acceleration)
-        return f"{self.name}: {sampled}, PGA {self.peak / STANDARD_GRAVITY:.4g} g, PGV {velocity:.4g} m/s{read}"
+        peaks = f"PGA {self.peak / STANDARD_GRAVITY:.4g} g, PGV {velocity:.4g} m/s"
+        return f"{self.name}: {sampled}, {peaks}{read}"
 
 
 def check_samples(name: str, times: Floats, columns: Mapping[str, Floats], least: int) -> None:
-    """Refuse fewer samples than `least`, columns of other lengths, numbers that are not finite, times that fall."""
+    """Raise InputError for fewer samples than `least`, or for times or values that are not valid.
+
+    Times must increase, all numbers must be finite, and all columns as long as the times.
+    """
     for what, values in {"time": times, **columns}.items():
         if values.ndim != 1 or values.shape != times.shape:
             raise InputError(
-                f"{name}: {what}: {values.shape} samples, where time has {times.shape}: must be rows"
+                f"{name}: {what}: {values.shape} samples, where time has {times.shape}: must be "
+                "rows"
             )
         for at in np.flatnonzero(~(np.abs(values) <= LARGEST))[:1]:
             raise InputError(
-                f"{name}: {what} of sample {at + 1} = {values[at]}: must be finite, at most {LARGEST:g}"
+                f"{name}: {what} of sample {at + 1} = {values[at]}: must be finite, at most "
+                f"{LARGEST:g}"
             )
     if times.size < least:
         raise InputError(f"{name}: {times.size} samples: must be at least {least}")
@@ -234,7 +242,8 @@ def check_samples(name: str, times: Floats, columns: Mapping[str, Floats], least
         now = times[at + 1]
         before = times[at]
         raise InputError(
-            f"{name}: time of sample {at + 2} = {now:.15g}: must be greater than {before:.15g} before it"
+            f"{name}: time of sample {at + 2} = {now:.15g}: must be greater than {before:.15g} "
+            "before it"
         )
 
 
@@ -276,8 +285,8 @@ def read_record(
         Strong-Motion Observation Systems (2001), "asa" the Archivo Estándar de Aceleración 2.0 of
         the Mexican networks.
     channel : int, optional
-        Which acceleration of a file that holds several, from 1 in the order of the file; needed
-        there.
+        Number of the acceleration in a file that holds several, from 1 in the order of the file;
+        needed there.
 
     Returns
     -------
@@ -286,13 +295,13 @@ def read_record(
     Raises
     ------
     InputError
-        The file cannot be read, or something in it is no record: with the number of the line, or
+        The file cannot be read, or it is not a record: the message has the number of the line, or
         the time.
 
     Notes
     -----
-    What looks like clipping, samples of which many are 0, and a vertical component are read, and
-    said by `Record.summary` (attribute `record_caution`).
+    A record that looks clipped, that has many samples of 0, or that is a vertical component is
+    read; `Record.summary` has a caution (attribute `record_caution`).
 
     See Also
     --------
@@ -320,12 +329,16 @@ def read_record(
 def _inspected(
     name: str, times: Floats, values: Floats, unit: str, reading: Reading, attrs: dict[str, str]
 ) -> Record:
-    """The record of values in a unit; what is found in it is refused, unless `reading` accepts it."""
+    """Return the record of values in a unit.
+
+    InputError: samples are missing or implausible, and `reading` does not accept that.
+    """
     kept = ~_is_fill(values)
     missing = "; ".join((*missing_samples(times, values), *_held(times[kept], values[kept])))
     if missing and reading.gaps == "refuse":
         raise InputError(
-            f"{name}: {missing}: samples are missing; gaps = 'linear' interpolates between the others"
+            f"{name}: {missing}: samples are missing; gaps = 'linear' interpolates between the "
+            "others"
         )
     record = Record(times[kept], values[kept] * UNITS[unit], name, attrs | {"record_units": unit})
     record = record.corrected(reading.baseline)
@@ -333,20 +346,23 @@ def _inspected(
     if odd and reading.implausible == "refuse":
         raise InputError(f"{name}: {odd}; or implausible = 'accept' takes the record as it is")
     cautions = [f"vertical component ({mark})"] if (mark := attrs.get("record_vertical")) else []
-    said = {
+    notes = {
         "record_accepted": "; ".join(filter(None, (missing, odd))),
         "record_caution": "; ".join((*cautions, *_cautions(times[kept], values[kept], unit))),
     }
-    return replace(record, attrs=record.attrs | {name: text for name, text in said.items() if text})
+    return replace(
+        record, attrs=record.attrs | {name: text for name, text in notes.items() if text}
+    )
 
 
 def missing_samples(times: Floats, values: Floats) -> Iterator[str]:
-    """Values, in any unit, that stand for missing samples, and intervals without samples."""
+    """Yield texts on fill values, in any unit, and on intervals without samples."""
     if (fill := _is_fill(values)).any():
         kinds = ", ".join(
-            "blank" if np.isnan(one) else f"{one:g}" for one in np.unique(values[fill])[:3]
+            "blank" if np.isnan(value) else f"{value:g}" for value in np.unique(values[fill])[:3]
         )
-        yield f"{fill.sum()} fill value{'s' if fill.sum() > 1 else ''} ({kinds}), first at t = {times[fill][0]:.6g} s"
+        number = f"{fill.sum()} fill value{'s' if fill.sum() > 1 else ''}"
+        yield f"{number} ({kinds}), first at t = {times[fill][0]:.6g} s"
     intervals = np.diff(times)
     if intervals.size < _FEWEST or not (intervals > 0.0).all():
         return
@@ -359,15 +375,15 @@ def missing_samples(times: Floats, values: Floats) -> Iterator[str]:
 
 
 def _is_fill(values: Floats) -> NDArray[np.bool_]:
-    """Which values stand for missing samples."""
+    """Return True where values stand for missing samples."""
     missing = np.isnan(values)
     magnitude = np.abs(np.nan_to_num(values))
-    known = np.isin(magnitude, _FILL)
-    others = np.flatnonzero(~known & ~missing)
-    if known.any() and others.size:
-        # 999 gal may be a peak: then its neighbours are on the way to it
+    looks_like_fill = np.isin(magnitude, _FILL)
+    others = np.flatnonzero(~looks_like_fill & ~missing)
+    if looks_like_fill.any() and others.size:
+        # 999 gal may be a peak: then the values beside it are not far from it
         between = np.interp(np.arange(values.size), others, values[others])
-        missing |= known & (np.abs(values - between) > 0.5 * magnitude)
+        missing |= looks_like_fill & (np.abs(values - between) > 0.5 * magnitude)
     # the same number again and again, far above all others
     largest = magnitude == magnitude.max(initial=0.0)
     rest = magnitude[~largest].max(initial=0.0)
@@ -381,22 +397,23 @@ def _is_fill(values: Floats) -> NDArray[np.bool_]:
 
 
 def _held(times: Floats, values: Floats) -> Iterator[str]:
-    """The first value that does not change while the ground shakes."""
+    """Yield a text on the first value that does not change while the ground shakes."""
     steps = np.abs(np.diff(values, prepend=np.nan, append=np.nan))
     changes = np.flatnonzero(steps != 0.0)
     starts = changes[:-1]
     lasts = changes[1:] - 1
     jumps = np.minimum(steps[changes[:-1]], steps[changes[1:]])
-    own = values[starts]
+    held = values[starts]
     peak = np.abs(values).max(initial=0.0)
-    shakes = (np.abs(own) > 0.01 * peak) | (jumps > 0.05 * peak)  # else the ground is at rest
+    shakes = (np.abs(held) > 0.01 * peak) | (jumps > 0.05 * peak)  # else the ground is at rest
     long = (lasts - starts >= _HELD_SAMPLES) & (times[lasts] - times[starts] >= _HELD)
     for at in np.flatnonzero(shakes & long)[:1]:
-        yield f"the value {own[at]:.6g} is held from t = {times[starts[at]]:.6g} to {times[lasts[at]]:.6g} s"
+        interval = f"from t = {times[starts[at]]:.6g} to {times[lasts[at]]:.6g} s"
+        yield f"the value {held[at]:.6g} is held {interval}"
 
 
 def _implausible(record: Record, unit: str) -> Iterator[str]:
-    """A peak that was never recorded, read in `unit`, and the unit that would explain it; a ground that moves away."""
+    """Yield texts on a peak that is implausible in `unit`, and on ground that moves away."""
     times = record.times
     acceleration = record.acceleration
     at = int(np.abs(acceleration).argmax())
@@ -412,7 +429,8 @@ def _implausible(record: Record, unit: str) -> Iterator[str]:
             else ""
         )
         limit = f"above {_STRONGEST:g} g" if abs(peak) > 1.0 else f"below {_WEAKEST:g} g"
-        yield f"peak acceleration {peak:.4g} g at t = {times[at]:.6g} s{hint}: {limit}, check units and header"
+        where = f"peak acceleration {peak:.4g} g at t = {times[at]:.6g} s"
+        yield f"{where}{hint}: {limit}, check units and header"
     if is_short:
         return
     displacement = peak_displacement(times, acceleration)
@@ -429,7 +447,7 @@ def _implausible(record: Record, unit: str) -> Iterator[str]:
 
 
 def _cautions(times: Floats, values: Floats, unit: str) -> Iterator[str]:
-    """Signs that a record was clipped, or that half of it is missing: said, not refused."""
+    """Yield cautions on a record that looks clipped, or of which half may be missing."""
     if values.size <= _FEWEST:
         return
     zeros = float((values == 0.0).mean())

@@ -1,4 +1,4 @@
-"""Suites of recorded motions: read together, told apart by labels, of any length and sampling."""
+"""Suites of recorded motions of any length and sampling, each with a label."""
 
 import glob
 from collections import Counter, defaultdict
@@ -52,7 +52,8 @@ class Pair:
     Examples
     --------
     >>> import slipsweep
-    >>> first, second = (slipsweep.Record.sampled([0, one, 0], 0.1, name) for one, name in ((3, "NS"), (4, "EW")))
+    >>> first = slipsweep.Record.sampled([0, 3, 0], 0.1, "NS")
+    >>> second = slipsweep.Record.sampled([0, 4, 0], 0.1, "EW")
     >>> slipsweep.Pair(first, second).rotated(90)
     Record('NS, EW at 90 degrees': 3 samples, 0.2 s, peak 4 m/s2)
     """
@@ -62,20 +63,20 @@ class Pair:
 
     def __post_init__(self) -> None:
         components = {"first": self.first, "second": self.second}
-        for name, own in components.items():
-            if not isinstance(own, Record):
+        for name, component in components.items():
+            if not isinstance(component, Record):
                 raise InputError(
-                    f"{name} = {shown(own)}: must be a Record, one component of a motion"
+                    f"{name} = {shown(component)}: must be a Record, one component of a motion"
                 )
         times, other = sorted((self.first.times, self.second.times), key=np.size, reverse=True)
-        # files round times: to the millionth part of an interval they are the same
+        # files round times; those that differ by a millionth of an interval are the same
         if np.abs(times[: other.size] - other).max() > 1e-6 * np.diff(other).min():
             raise InputError(
                 f"{self.name}: the components of a pair must be sampled at the same times"
             )
-        for name, own in components.items():
-            filled = np.append(own.acceleration, np.zeros(times.size - own.times.size))
-            object.__setattr__(self, name, replace(own, times=times, acceleration=filled))
+        for name, component in components.items():
+            filled = np.append(component.acceleration, np.zeros(times.size - component.times.size))
+            object.__setattr__(self, name, replace(component, times=times, acceleration=filled))
 
     @property
     def name(self) -> str:
@@ -89,16 +90,19 @@ class Pair:
 
     @property
     def attrs(self) -> dict[str, str]:
-        """How the components were read: what they have in common once, else one after the other."""
-        one = self.first.attrs
-        other = self.second.attrs
+        """Attributes of the components; where they differ, that of the second after the first."""
+        first = self.first.attrs
+        second = self.second.attrs
         return {
-            name: " ".join(dict.fromkeys((one.get(name, ""), other.get(name, ""))))
-            for name in {**one, **other}
+            name: " ".join(dict.fromkeys((first.get(name, ""), second.get(name, ""))))
+            for name in {**first, **second}
         }
 
     def rotated(self, azimuth: float) -> Record:
-        """The component at an azimuth, degrees from the first towards the second, exact between samples as at them."""
+        """Return the component at an azimuth, degrees from the first towards the second.
+
+        It is exact at the samples and between them.
+        """
         from scipy.special import cosdg, sindg  # exact at the quarters of a turn
 
         degrees = check_single("azimuth", azimuth)
@@ -109,27 +113,27 @@ class Pair:
 
 
 Motion: TypeAlias = Record | Pair
-_Source: TypeAlias = tuple[
-    Path | Record, ...
-]  # what a motion is read from: one part, or the components of a pair
+
+#: Files or Records of a motion: one, or the two components of a pair.
+_Source: TypeAlias = tuple[Path | Record, ...]
 
 
 @dataclass(frozen=True, repr=False)
 class Suite:
     """Recorded motions that shake the same blocks: the dimension `motion` of results.
 
-    ``suite["label"]``, ``suite[0]`` is one of them, ``suite[2:5]`` and ``suite[["a", "b"]]`` are
-    suites of some.
+    ``suite["label"]`` and ``suite[0]`` are motions, ``suite[2:5]`` and ``suite[["a", "b"]]`` are
+    suites of some motions.
 
     Attributes
     ----------
     motions : tuple of Record or of Pair
-        Of any length and sampling.  A suite of pairs wants an `azimuth`.
+        Of any length and sampling.  A suite of pairs needs an `azimuth`.
     labels : tuple of str
         Labels in results, all different; by default the stems of the records' names (of the first
         components').
     name : str
-        What the suite is called in results.
+        Name of the suite in results.
     left_out : tuple of str
         Files of vertical components that `read_suite` found and left out.
 
@@ -166,13 +170,16 @@ class Suite:
                 f"motions: {len(motions)}: must be one at least, all Records or all Pairs"
             )
         labels = tuple(check_list("labels", self.labels, "texts"))
-        labels = labels or tuple(_labels([Path(_components(one)[0].name) for one in motions]))
+        labels = labels or tuple(_labels([Path(_components(motion)[0].name) for motion in motions]))
         texts = {
-            one for one in labels if isinstance(one, str) and one.strip() and one.isprintable()
+            label
+            for label in labels
+            if isinstance(label, str) and label.strip() and label.isprintable()
         }
         if not len(motions) == len(labels) == len(texts):
             raise InputError(
-                f"labels = {shown(labels)}: must be {len(motions)} different texts that can be printed"
+                f"labels = {shown(labels)}: must be {len(motions)} different texts that can be "
+                "printed"
             )
         object.__setattr__(self, "motions", motions)
         object.__setattr__(self, "labels", labels)
@@ -193,7 +200,8 @@ class Suite:
         if not isinstance(which, (slice, list, tuple)):
             return self.motions[self.index(which)]
         places = [
-            self.index(one) for one in (self.labels[which] if isinstance(which, slice) else which)
+            self.index(label)
+            for label in (self.labels[which] if isinstance(which, slice) else which)
         ]
         return Suite(
             tuple(self.motions[at] for at in places),
@@ -203,7 +211,7 @@ class Suite:
         )
 
     def index(self, which: str | int) -> int:
-        """The place of a motion (InputError: there is none of that label)."""
+        """Return the index of a motion (InputError: none has that label)."""
         if isinstance(which, str) and which not in self.labels:
             raise InputError(
                 f"motion = {shown(which)}: not in the suite; {did_you_mean(which, self.labels)}"
@@ -217,13 +225,16 @@ class Suite:
 
     @property
     def components(self) -> tuple[Record, ...]:
-        """All records: the motions, or the components of one after the other."""
+        """All records: the motions, or the components of all pairs, pair after pair."""
         return tuple(chain.from_iterable(map(_components, self)))
 
     @cached_property
     def measures(self) -> dict[str, NDArray[Any]]:
-        """`variables.MOTION_COORDINATES` of every motion; of pairs without intensities, which depend on the azimuth."""
-        found: dict[str, NDArray[Any]] = {
+        """`variables.MOTION_COORDINATES` of all motions.
+
+        Pairs have no intensities here, as these depend on the azimuth.
+        """
+        measures: dict[str, NDArray[Any]] = {
             "motion_file": np.array([motion.attrs.get("record", "") for motion in self]),
             "motion_sha256": np.array([motion.attrs.get("record_sha256", "") for motion in self]),
             "motion_samples": np.array([motion.times.size for motion in self], np.int32),
@@ -231,43 +242,45 @@ class Suite:
                 [np.ptp(motion.times) / (motion.times.size - 1) for motion in self]
             ),
         }
-        return (
-            found
-            if self.has_pairs
-            else found | self.intensities(np.arange(len(self)), np.zeros(len(self)))
-        )
+        if self.has_pairs:
+            return measures
+        return measures | self.intensities(np.arange(len(self)), np.zeros(len(self)))
 
     def intensities(self, places: NDArray[np.int64], azimuths: Floats) -> dict[str, Floats]:
-        """Intensity measures of the motions at some places, each at its azimuth; the arrays have one shape."""
+        """Return the intensity measures of motions at their azimuths, in the shape of `places`.
+
+        `places` are indices of motions; `azimuths` (degrees) have the same shape.
+        """
         motions = [
-            self.record(int(at), float(own))
-            for at, own in zip(places.flat, azimuths.flat, strict=True)
+            self.record(int(at), float(azimuth))
+            for at, azimuth in zip(places.flat, azimuths.flat, strict=True)
         ]
-        found = [intensity_measures(one.times, one.acceleration) for one in motions]
+        measures = [intensity_measures(motion.times, motion.acceleration) for motion in motions]
         return {
-            f"motion_{m}": np.reshape([one[m] for one in found], azimuths.shape)
+            f"motion_{m}": np.reshape([motion[m] for motion in measures], azimuths.shape)
             for m in INTENSITY_MEASURES
         }
 
     def record(self, at: int, azimuth: float) -> Record:
-        """The motion at a place, of a pair the component at an azimuth."""
+        """Return the motion at an index; of a pair, its component at an azimuth."""
         motion = self.motions[at]
         return motion.rotated(azimuth) if isinstance(motion, Pair) else motion
 
     @property
     def attrs(self) -> dict[str, Any]:
-        """What results say of the suite: how many motions, how all were read if alike, and which are the same."""
+        """Attributes for results: the number of motions, duplicates, and how all were read."""
         about: dict[str, Any] = {"suite": self.name, "motions": len(self)}
         if self.left_out:
             about["left_out_vertical"] = ", ".join(self.left_out)
         for name in ("record_format", "record_units", "baseline"):
-            values = {one.attrs.get(name) for one in self.components}
+            values = {record.attrs.get(name) for record in self.components}
             if len(values) == 1 and None not in values:
                 about[name] = values.pop()
         alike = defaultdict[bytes, list[str]](list)  # such as one file under two names
         for label, motion in zip(self.labels, self, strict=True):
             samples = (
-                one.times.tobytes() + one.acceleration.tobytes() for one in _components(motion)
+                record.times.tobytes() + record.acceleration.tobytes()
+                for record in _components(motion)
             )
             alike[b"".join(samples)].append(label)
         if twice := [", ".join(labels) for labels in alike.values() if len(labels) > 1]:
@@ -275,7 +288,7 @@ class Suite:
         return about
 
     def summary(self) -> str:
-        """One line a record, as `Record.summary`, and one on what was left out."""
+        """Return a line for each record, as `Record.summary`, and one on files left out."""
         lines = [record.summary() for record in self.components]
         if self.left_out:
             lines.append(
@@ -285,9 +298,9 @@ class Suite:
         return "\n".join(lines)
 
     def cautions(self) -> list[str]:
-        """A line for each record of which something may be wrong."""
-        said = {record.name: record.attrs.get("record_caution") for record in self.components}
-        return [f"caution: {name}: {text}" for name, text in said.items() if text]
+        """Return a line for each record in which something may be wrong."""
+        texts = {record.name: record.attrs.get("record_caution") for record in self.components}
+        return [f"caution: {name}: {text}" for name, text in texts.items() if text]
 
 
 def read_suite(
@@ -341,8 +354,8 @@ def read_suite(
     Examples
     --------
     >>> import slipsweep
-    >>> slipsweep.read_suite("sweeps/data/suite/*_H1.AT2")
-    Suite('sweeps/data/suite/*_H1.AT2': 4 motions: rock-far_H1, rock-near_H1, soft-far_H1, stiff-pulse_H1)
+    >>> slipsweep.read_suite("sweeps/data/suite/*_H1.AT2").labels
+    ('rock-far_H1', 'rock-near_H1', 'soft-far_H1', 'stiff-pulse_H1')
     >>> slipsweep.read_suite("sweeps/data/suite", pairs=("_H1", "_H2"))
     Suite('sweeps/data/suite': 4 pairs: rock-far, rock-near, soft-far, stiff-pulse)
     """
@@ -357,11 +370,14 @@ def suite_in(
     reading: Reading,
     vertical: Vertical = "leave_out",
 ) -> Suite:
-    """`read_suite` of paths that are relative to a folder, whose own name is not read as a pattern."""
+    """Return the suite of `read_suite` from paths that are relative to a folder.
+
+    The name of the folder itself is not read as a pattern.
+    """
     check_choice("vertical", vertical, get_args(Vertical))
     sources = _sources(paths, folder)
     files = [part for part in dict.fromkeys(chain.from_iterable(sources)) if isinstance(part, Path)]
-    # what its name says to be vertical need not be read
+    # files that are vertical by their names need not be read
     marks = {file: vertical_mark("", file) for file in files} if vertical == "leave_out" else {}
     records = _read([file for file in files if not marks.get(file)], reading)
     if vertical == "leave_out":
@@ -369,18 +385,18 @@ def suite_in(
     left_out = {file: f"{file.name} ({mark})" for file, mark in marks.items() if mark}
     sources = _horizontal(sources, left_out)
     sources, labels = (sources, ()) if pairs is None else _paired(sources, pairs)
-    found = [
+    parts_of_motions = [
         [part if isinstance(part, Record) else records[part] for part in source]
         for source in sources
     ]
-    motions = tuple(Pair(*parts) if len(parts) == 2 else parts[0] for parts in found)
+    motions = tuple(Pair(*parts) if len(parts) == 2 else parts[0] for parts in parts_of_motions)
     entry = paths[0] if isinstance(paths, (list, tuple)) and len(paths) == 1 else paths
     name = str(entry) if isinstance(entry, (str, Path)) else "suite"
     return Suite(motions, labels, name, tuple(left_out.values()))
 
 
 def _read(files: Sequence[Path], reading: Reading) -> dict[Path, Record]:
-    """The records in files (InputError: all files that hold none, with the reasons)."""
+    """Return the records in files (InputError: all files that hold none, with the reasons)."""
     records = dict[Path, Record]()
     reasons = dict[Path, str]()
     for file in files:
@@ -400,7 +416,7 @@ def _read(files: Sequence[Path], reading: Reading) -> dict[Path, Record]:
 
 
 def _horizontal(sources: list[_Source], vertical: Mapping[Path, str]) -> list[_Source]:
-    """The sources without vertical components (InputError: a pair has one, or nothing is left)."""
+    """Return sources without vertical components (InputError: a pair has one; none is left)."""
     kept = [source for source in sources if not any(part in vertical for part in source)]
     names = ", ".join(vertical.values())
     advice = "vertical = 'accept' takes them"
@@ -412,36 +428,36 @@ def _horizontal(sources: list[_Source], vertical: Mapping[Path, str]) -> list[_S
 
 
 def _components(motion: Motion) -> tuple[Record, ...]:
-    """The two components of a pair, or the record alone."""
+    """Return the two components of a pair, or the record alone."""
     return (motion.first, motion.second) if isinstance(motion, Pair) else (motion,)
 
 
-def _sources(given: Any, folder: Path) -> list[_Source]:
-    """Files that entries name, each once."""
+def _sources(paths: Any, folder: Path) -> list[_Source]:
+    """Return the files and Records that entries name, each once."""
     what = "files, folders, patterns, pairs of files or Records"
     parts = (str, Path, Record)
-    found = list[_Source]()
+    sources = list[_Source]()
     for entry in (
-        [given]
-        if isinstance(given, (str, Path, Record, Pair))
-        else check_list("paths", given, what)
+        [paths]
+        if isinstance(paths, (str, Path, Record, Pair))
+        else check_list("paths", paths, what)
     ):
         if isinstance(entry, (Record, Pair)):
-            found.append(_components(entry))
+            sources.append(_components(entry))
         elif isinstance(entry, (str, Path)):
-            found += [(file,) for file in _matching(folder, entry) if (file,) not in found]
+            sources += [(file,) for file in _matching(folder, entry) if (file,) not in sources]
         elif (
             isinstance(entry, (list, tuple))
-            and len(entry) == sum(isinstance(one, parts) for one in entry) == 2
+            and len(entry) == sum(isinstance(part, parts) for part in entry) == 2
         ):
-            found.append(
+            sources.append(
                 tuple(part if isinstance(part, Record) else folder / part for part in entry)
             )
         else:
             raise InputError(f"paths: {shown(entry)}: must be one of {what}")
-    if not found:
+    if not sources:
         raise InputError("paths = []: must name one motion at least")
-    return found
+    return sources
 
 
 def _matching(folder: Path, entry: str | Path) -> list[Path]:
@@ -461,36 +477,33 @@ def _matching(folder: Path, entry: str | Path) -> list[Path]:
 def _paired(
     sources: Sequence[_Source], endings: Sequence[str]
 ) -> tuple[list[_Source], tuple[str, ...]]:
-    """Files put together two by two, and the labels of the pairs: what the names of both files begin with."""
-    texts = [
-        one
-        for one in check_list("pairs", endings, "two endings of names")
-        if isinstance(one, str) and one
-    ]
+    """Return pairs of files, and their labels: the common beginnings of their names."""
+    entries = check_list("pairs", endings, "two endings of names")
+    texts = [entry for entry in entries if isinstance(entry, str) and entry]
     if len(texts) != len(endings) or len({*texts}) != 2:
         raise InputError(
-            f"pairs = {shown(endings)}: must be two different endings of names, such as ('_NS', '_EW')"
+            f"pairs = {shown(endings)}: must be two different endings of names, such as "
+            "('_NS', '_EW')"
         )
     first, second = texts
     parts = list(chain.from_iterable(sources))
     stems = {
-        one: one.stem.removesuffix(first)
-        for one in parts
-        if isinstance(one, Path) and one.stem.endswith(first)
+        part: part.stem.removesuffix(first)
+        for part in parts
+        if isinstance(part, Path) and part.stem.endswith(first)
     }
     pairs: list[_Source] = [
-        (one, one.with_name(stem + second + one.suffix)) for one, stem in stems.items()
+        (file, file.with_name(stem + second + file.suffix)) for file, stem in stems.items()
     ]
-    whole = {one for pair in pairs if {*pair} <= {*parts} for one in pair}
-    if incomplete := ", ".join(one.name for one in parts if one not in whole):
+    paired = {part for pair in pairs if {*pair} <= {*parts} for part in pair}
+    if incomplete := ", ".join(part.name for part in parts if part not in paired):
         raise InputError(f"pairs = {shown(endings)}: without the other component: {incomplete}")
-    return pairs, tuple(
-        _labels([one.with_name(stem.rstrip("_-. ") or one.stem) for one, stem in stems.items()])
-    )
+    names = [file.with_name(stem.rstrip("_-. ") or file.stem) for file, stem in stems.items()]
+    return pairs, tuple(_labels(names))
 
 
 def _labels(paths: Sequence[Path]) -> Iterator[str]:
-    """The stems of files; with folder and ending where stems are alike, and numbered where that does not help."""
+    """Yield labels of files: stems; where stems are equal folder and name; a number if need be."""
     stems = Counter(path.stem for path in paths)
     seen = Counter[str]()
     for path in paths:

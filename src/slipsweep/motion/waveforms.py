@@ -1,4 +1,4 @@
-"""Waveforms: what the base does, as a user chooses it (`cutting` cuts it into the pieces that the solvers follow).
+"""Waveforms that the user may choose for the base; `cutting` makes the pieces that solvers follow.
 
 A waveform w(φ) has the period 2π and the peak max|w| = 1, so that the amplitude A stays the peak
 ground acceleration; φ = ωt counts from the beginning of the shaking.  A ramp multiplies it by an
@@ -18,29 +18,32 @@ from slipsweep.model.parameters import MOST_CYCLES, number_text
 
 @dataclass(frozen=True)
 class Waveform(Choice):
-    """A waveform that is repeated for some cycles, with its ramps; its parameters are those of `Sine`."""
+    """A waveform that is repeated for some cycles, with ramps; `Sine` describes the parameters."""
 
     cycles: int = option("cycles of shaking", 10, least=1, most=MOST_CYCLES)
     ramp_in: float = option("cycles over which the shaking grows", 0.0)
     ramp_out: float = option("cycles over which the shaking decreases", 0.0)
 
     def check(self) -> None:
-        """Refuse ramps longer than the shaking."""
+        """Raise InputError if the ramps are longer than the shaking."""
         if self.ramp_in + self.ramp_out > self.cycles:
             ramps = number_text(self.ramp_in + self.ramp_out)
             raise InputError(
-                f"ramp_in + ramp_out = {ramps}: must not exceed the {self.cycles} cycles of the shaking"
+                f"ramp_in + ramp_out = {ramps}: must not exceed the {self.cycles} cycles of the "
+                "shaking"
             )
 
     @property
     def plain(self) -> Self:
-        """One cycle of it without ramps."""
+        """One cycle without ramps."""
         return replace(self, cycles=1, ramp_in=0.0, ramp_out=0.0)
 
     def __str__(self) -> str:
-        """In words, as a caption has it: ``10 cycles of a triangle wave, ramp in 2 cycles``."""
-        given = (("in", self.ramp_in), ("out", self.ramp_out))
-        ramps = "".join(f", ramp {word} {number_text(ramp)} cycles" for word, ramp in given if ramp)
+        """Return the words of captions: ``10 cycles of a triangle wave, ramp in 2 cycles``."""
+        ramps_at = (("in", self.ramp_in), ("out", self.ramp_out))
+        ramps = "".join(
+            f", ramp {word} {number_text(ramp)} cycles" for word, ramp in ramps_at if ramp
+        )
         return f"{self.cycles} cycle{'s' if self.cycles > 1 else ''} of a {self._words()}{ramps}"
 
     def _words(self) -> str:
@@ -133,7 +136,7 @@ class Square(Waveform):
 
 
 @dataclass(frozen=True)
-class _Terms:  # a base of its own, as a field without a default comes first
+class _Terms:  # a base class, as fields without a default must come first
     amplitudes: Sequence[float] = option("relative amplitudes of the harmonics")
     multiples: Sequence[int] = option(
         "multiples of the frequency of the harmonics", least=1, most=100
@@ -168,14 +171,14 @@ class Harmonics(Waveform, _Terms):
     Examples
     --------
     >>> import slipsweep
-    >>> slipsweep.Harmonics([1, 0.3], [1, 3])
-    Harmonics(amplitudes=(1.0, 0.3), multiples=(1, 3), phases=(0.0, 0.0), cycles=10, ramp_in=0.0, ramp_out=0.0)
+    >>> print(slipsweep.Harmonics([1, 0.3], [1, 3]))
+    10 cycles of a wave of harmonics 1:1:0, 0.3:3:0
     """
 
     name: ClassVar[str] = "harmonics"
 
     def check(self) -> None:
-        """Refuse columns of different lengths, multiples twice and sums of nothing."""
+        """Raise InputError for lists of different lengths, repeated multiples, or a sum of 0."""
         super().check()
         count = len(self.amplitudes)
         if self.phases is None:
@@ -183,7 +186,8 @@ class Harmonics(Waveform, _Terms):
         for key in ("multiples", "phases"):
             if len(getattr(self, key)) != count:
                 raise InputError(
-                    f"{key}: {len(getattr(self, key))} numbers; must be as many as amplitudes, {count}"
+                    f"{key}: {len(getattr(self, key))} numbers; must be as many as amplitudes, "
+                    f"{count}"
                 )
         if len(set(self.multiples)) < count:
             raise InputError(f"multiples = {list(self.multiples)}: must not be repeated")
@@ -206,6 +210,6 @@ WAVEFORMS = Family[Waveform](
 
 
 def peak_acceleration(displacement_amplitude: Any, frequency: Any) -> Any:
-    """A = (2πf)² d of a motion of peak displacement d (m), m/s², of numbers, arrays or variables."""
+    """Peak acceleration A = (2πf)² d, m/s², of a peak displacement d (m); numbers or arrays."""
     omega = 2.0 * math.pi * frequency
     return omega * omega * displacement_amplitude

@@ -1,4 +1,4 @@
-"""One time history, exact: the phases of motion that the cycle solver finds, sampled at any times."""
+"""`simulate`: the motion of one block over time, at any times."""
 
 import math
 import threading
@@ -12,42 +12,36 @@ from numpy.typing import NDArray
 
 from slipsweep.errors import InputError
 from slipsweep.grid import engine, plans, resources, solvers
-from slipsweep.grid import inputs as grid_inputs
-from slipsweep.kernels import step
+from slipsweep.grid.inputs import Problem, check_problem, given_inputs
+from slipsweep.kernels import step, step_cells
 from slipsweep.kernels.block import RESULTS
 from slipsweep.kernels.history import History
-from slipsweep.model import equations as eq
-from slipsweep.model import options, parameters, variables
+from slipsweep.model import equations, options, parameters, variables
+from slipsweep.model.docstrings import with_parameters
 from slipsweep.model.variables import HISTORY
 from slipsweep.motion import cutting
 from slipsweep.motion.paths import values_at
 from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Suite
 from slipsweep.motion.waveforms import Waveform
-from slipsweep.studies import datasets
+from slipsweep.studies.sweeps import Excitation, naming_choices
 
 Floats = NDArray[np.float64]
 
 
-@datasets.naming_choices
+@naming_choices
+@with_parameters
 def simulate(
     theta: float | None = None,
     mu_s: float | None = None,
     amplitude: float | None = None,
     frequency: float | None = None,
     *,
-    phi: float | None = None,
-    excitation: datasets.Excitation = "sine",
+    excitation: Excitation = "sine",
     model: options.Model | str = "mendez",
     solver: options.Solver | str = "auto",
-    times: Sequence[float] | np.ndarray | None = None,
-    points_per_cycle: int | None = None,
+    phi: float | None = None,
     displacement_amplitude: float | None = None,
-    scale: float | None = None,
-    pgv: float | None = None,
-    arias_intensity: float | None = None,
-    time_scale: float | None = None,
-    polarity: int | None = None,
     yield_acceleration: float | None = None,
     yield_coefficient: float | None = None,
     upslope_yield_acceleration: float | None = None,
@@ -60,15 +54,21 @@ def simulate(
     fast_mu: float | None = None,
     rate_constant: float | None = None,
     structure_frequency: float | None = None,
+    scale: float | None = None,
+    pgv: float | None = None,
+    arias_intensity: float | None = None,
+    time_scale: float | None = None,
+    polarity: int | None = None,
+    times: Sequence[float] | np.ndarray | None = None,
+    points_per_cycle: int | None = None,
 ) -> xr.Dataset:
     """Time history of one block: event by event, so that the samples are exact, or by steps.
 
+    Of a suite one motion is taken: ``excitation=suite["label"]``, of a pair
+    ``suite["label"].rotated(azimuth)``.
+
     Parameters
     ----------
-    theta, mu_s, amplitude, frequency : float
-        One case; these and the remaining parameters as in `slipsweep.sweep`, but that of a suite
-        one motion is taken: ``excitation=suite["label"]``, of a pair
-        ``suite["label"].rotated(azimuth)``.
     times : array, optional
         Times to sample, s, increasing, and not negative under a waveform; by default
         `points_per_cycle` a cycle, from 0 to the end of the shaking, or the times of a record's
@@ -102,37 +102,15 @@ def simulate(
 
     >>> import slipsweep
     >>> history = slipsweep.simulate(
-    ...     5, 0.38, 3.55, 1.8, yield_acceleration=0.59, decay_rate=2.7, excitation=slipsweep.Sine(cycles=5)
+    ...     5, 0.38, 3.55, 1.8, yield_acceleration=0.59, decay_rate=2.7,
+    ...     excitation=slipsweep.Sine(cycles=5),
     ... )
-    >>> print(f"{history.permanent_displacement.item() * 1000:.0f} mm after {history.time.values[-1]:.2f} s")
+    >>> mm = history.permanent_displacement.item() * 1000
+    >>> print(f"{mm:.0f} mm after {history.time.values[-1]:.2f} s")
     331 mm after 2.78 s
     """
-    inputs = grid_inputs.Inputs(
-        theta=theta,
-        mu_s=mu_s,
-        phi=phi,
-        amplitude=amplitude,
-        frequency=frequency,
-        displacement_amplitude=displacement_amplitude,
-        scale=scale,
-        pgv=pgv,
-        arias_intensity=arias_intensity,
-        time_scale=time_scale,
-        polarity=polarity,
-        yield_acceleration=yield_acceleration,
-        yield_coefficient=yield_coefficient,
-        upslope_yield_acceleration=upslope_yield_acceleration,
-        decay_rate=decay_rate,
-        delta_mu=delta_mu,
-        minimum_friction=minimum_friction,
-        residual_mu=residual_mu,
-        residual_phi=residual_phi,
-        weakening_distance=weakening_distance,
-        fast_mu=fast_mu,
-        rate_constant=rate_constant,
-        structure_frequency=structure_frequency,
-    )
-    problem = grid_inputs.check_problem(excitation, model, solver)
+    inputs = given_inputs(locals())
+    problem = check_problem(excitation, model, solver)
     motion = problem.excitation
     if isinstance(motion, Suite):
         one_motion = f"suite[{motion.labels[0]!r}]{'.rotated(azimuth)' if motion.has_pairs else ''}"
@@ -147,40 +125,44 @@ def simulate(
     for name, variable in plan.coords.items():
         if variable.dims:
             raise InputError(f"{name}: simulate takes one case; must be a single number")
-    one = _History(problem, plan.coords, plan.solve())
+    case = _History(problem, plan.coords, plan.solve())
     if times is None:
         points = 512 if points_per_cycle is None else points_per_cycle
-        phases = one.points(
+        phases = case.points(
             parameters.check_whole("points_per_cycle", points, 4, parameters.MOST_POINTS)
         )
-        grid = phases * one.unit
+        grid = phases * case.unit
     else:
         grid = np.atleast_1d(parameters.check_numbers("times", times))
         least, sign = (0.0, " >= 0") if isinstance(motion, Waveform) else (-math.inf, "")
         with np.errstate(over="ignore"):
-            phases = grid / one.unit
+            phases = grid / case.unit
         increasing = (
             grid.ndim == 1 and grid.size and (np.diff(grid) > 0.0).all() and grid[0] >= least
         )
         if not increasing or not np.isfinite(phases).all():
             raise InputError(f"times: must be one row of finite, increasing numbers{sign}")
     time = xr.Variable(("time",), grid, {"units": "s", "long_name": "time"})
-    found = one.summary.assign(one.columns(phases) | one.half_waves()).assign_coords(time=time)
-    return found.assign_attrs(title="Time history of a rigid block")
+    series = case.columns(phases) | case.half_waves()
+    history = case.summary.assign(series).assign_coords(time=time)
+    return history.assign_attrs(title="Time history of a rigid block")
 
 
 class _History:
-    """One case, its results as a sweep gives them, and its history; phases are ωt, or a record's times at scale 1."""
+    """The history of one case; `summary` has its results as a sweep gives them.
+
+    Phases are ωt, or the times of a record at time scale 1.
+    """
 
     def __init__(
-        self, problem: grid_inputs.Problem, inputs: Mapping[str, xr.Variable], summary: xr.Dataset
+        self, problem: Problem, inputs: Mapping[str, xr.Variable], summary: xr.Dataset
     ) -> None:
         self.problem = problem
         self.inputs = inputs
         self.summary = summary
-        given = engine.cell_inputs(problem, inputs)
+        cell = engine.cell_inputs(problem, inputs)
         motion = problem.excitation
-        self.fields = {name: float(value) for name, value in given.items()}
+        self.fields = {name: float(value) for name, value in cell.items()}
         self.options = solvers.options_of(problem, wants_peak=True)
         self.record = motion if isinstance(motion, Record) else None
         if self.record is not None:
@@ -192,13 +174,13 @@ class _History:
         self.valueless = bool(int(summary["validity"]) & variables.VALUELESS)
 
     def sampled(self, phases: Floats) -> Floats:
-        """The rows of `HISTORY` at phases, velocity and displacement in units of phase."""
+        """Return the rows of `HISTORY` at phases; phase is the unit of time."""
         table = np.empty((len(HISTORY), phases.size))
         if isinstance(self.problem.solver, options.Step):
             self._step(phases, table)
         else:
             self._walk(phases, table)
-        if self.valueless:  # from the beginning on, also where the flag is raised later
+        if self.valueless:  # there is no value from the beginning on
             table[1:] = math.nan
         return table
 
@@ -206,11 +188,13 @@ class _History:
         """Return the steps that are taken, of dtype `step.LOG`."""
         polarity = 1.0 if self.record is None else float(self.inputs["polarity"])
         stepper = solvers.stepper_of(self.problem, self.options, polarity)
-        cells = np.full((1, len(step.STEP_CELL.names or ())), math.nan).view(step.STEP_CELL)[:, 0]
+        cells = np.full((1, len(step_cells.STEP_CELL.names or ())), math.nan).view(
+            step_cells.STEP_CELL
+        )[:, 0]
         for name, value in self.fields.items():
             cells[name] = value
         results = np.empty((len(RESULTS), 1))
-        # once to count the steps, once to note them
+        # the first run counts the steps, the second logs them
         counted = _interruptible(stepper, cells, np.empty(1, step.LOG), results)
         log = np.empty(int(counted["logged"]), step.LOG)
         _interruptible(stepper, cells, log, results)
@@ -220,8 +204,8 @@ class _History:
         """Fill in a history by steps."""
         log = self._logged()
         table[0] = self.fields["amplitude"] * values_at(self.path, phases)
-        table[1], table[3], table[4] = step.samples_of(log, phases, table[0])
-        table[2] = eq.mobilised_friction(
+        table[1], table[3], table[4] = step_cells.samples_of(log, phases, table[0])
+        table[2] = equations.mobilised_friction(
             table[0],
             table[1],
             self.fields.get("mu_s", math.nan),
@@ -236,40 +220,45 @@ class _History:
         )
 
     def columns(self, phases: Floats) -> dict[str, xr.Variable]:
-        """The variables of a history."""
-        found = dict(zip(HISTORY, self.sampled(phases), strict=True))
+        """Return the variables of a history."""
+        series = dict(zip(HISTORY, self.sampled(phases), strict=True))
         if "mu_s" not in self.inputs:  # Eq. 1 needs θ and μs
-            del found["friction_coefficient"]
+            del series["friction_coefficient"]
         with np.errstate(over="ignore"):
-            found["relative_velocity"] *= self.unit
-            found["relative_displacement"] *= self.unit * self.unit
-        if not self.valueless and not all(np.isfinite(values).all() for values in found.values()):
-            given = ", ".join(
-                f"{name} = {parameters.number_text(float(one))}"
-                for name, one in self.inputs.items()
+            series["relative_velocity"] *= self.unit
+            series["relative_displacement"] *= self.unit * self.unit
+        if not self.valueless and not all(np.isfinite(values).all() for values in series.values()):
+            inputs_text = ", ".join(
+                f"{name} = {parameters.number_text(float(value))}"
+                for name, value in self.inputs.items()
             )
             raise InputError(
-                f"{given}: the history is then no finite number in double precision; must be nearer to 1"
+                f"{inputs_text}: the history is then no finite number in double precision; must be "
+                "nearer to 1"
             )
         return {
             name: xr.Variable(("time",), values.copy(), HISTORY[name])
-            for name, values in found.items()
+            for name, values in series.items()
         }
 
     def half_waves(self) -> dict[str, xr.Variable]:
-        """The positive half waves of a record, and the sliding mode of each (`HALF_WAVES`); of a waveform none."""
+        """Return the positive half waves of a record and their sliding modes (`HALF_WAVES`).
+
+        A waveform has none.
+        """
         if self.record is None:
             return {}
         with np.errstate(over="ignore"):
             peak = self.path.intervals["height"] * self.fields["amplitude"]
-        given = {**self.inputs, "amplitude": xr.Variable("half_wave", peak)}
-        request = engine.Request(self.problem, {"half_wave": peak.size}, given, ("sliding_mode",))
+        of_half_waves = {**self.inputs, "amplitude": xr.Variable("half_wave", peak)}
+        sizes = {"half_wave": peak.size}
+        request = engine.Request(self.problem, sizes, of_half_waves, ("sliding_mode",))
         mode = engine.friction_parameters(request)["sliding_mode"].values
         if self.valueless:
             mode[:] = variables.SlidingMode.MISSING
         first = self.path.intervals["first"]
         after = self.path.intervals["end"]
-        found = {
+        series = {
             "half_wave_start": self.unit * self.path.base.pieces["start"][first],
             "half_wave_end": self.unit * self.path.base.pieces["end"][after - 1],
             "half_wave_peak": peak,
@@ -277,12 +266,12 @@ class _History:
         }
         return {
             name: xr.Variable(("half_wave",), values, variables.HALF_WAVES[name])
-            for name, values in found.items()
+            for name, values in series.items()
         }
 
     def points(self, points_per_cycle: int) -> Floats:
-        """Phases of so many points a cycle, or the samples of a record, and on to the end of the slide."""
-        # of the shaking, and most of a slide after it
+        """Return phases of the shaking (of a record, its samples) and of the slide after it."""
+        # points of the shaking, and most points of a slide after it
         if self.record is not None:
             count = self.record.times.size
             most = max(20_000, self.record.times.size)
@@ -291,7 +280,7 @@ class _History:
             count = points_per_cycle * self.options.cycles + 1
             most = 100 * points_per_cycle
             step = 2.0 * math.pi / points_per_cycle
-        # the table, its columns apart, phases and times
+        # table, copies of its columns, phases and times
         needed = (count + most) * 8 * (2 * len(HISTORY) + 2)
         advice = "take fewer cycles or points_per_cycle, or give times"
         resources.check_memory(f"a history of {count + most:.4g} points", needed, advice)
@@ -314,23 +303,23 @@ class _History:
                 after = float(velocity / (block - ground)) if velocity != 0.0 else 0.0
         if not math.isfinite(after):
             raise InputError(
-                "the block slides on after the shaking for more cycles than double precision holds; give times, or a "
-                "larger yield_acceleration"
+                "the block slides on after the shaking for more cycles than double precision "
+                "holds; give times, or a larger yield_acceleration"
             )
         return self._points_to(shaken, after, step, most)
 
     def _points_to(self, shaken: Floats, after: float, step: float, most: int) -> Floats:
-        """Phases of the shaking, and on to the end of the slide."""
+        """Return the phases of the shaking, then those of the slide that goes on after it."""
         # a slide that brakes by 1e-7 m/s² lasts for months: under a constant deceleration few
         # points are enough
         beyond = math.ceil(min(after, most * step) / step)
-        # a hair further than the end, which is rounded
+        # a little beyond the end, which is rounded
         rest = np.linspace(0.0, max(after * (1.0 + 1e-12), beyond * step), beyond + 1)[1:]
         return np.concatenate([shaken, shaken[-1] + rest])
 
 
 def _interruptible(kernel: Callable[..., Any], *args: Any) -> Any:
-    """Run a kernel on a thread: the main thread hears Ctrl-C while it waits, and a daemon does not hold up the exit."""
+    """Run a kernel on a daemon thread, so that Ctrl-C interrupts it and ends the program."""
     done: Future[Any] = Future()
 
     def run() -> None:

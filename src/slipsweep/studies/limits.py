@@ -22,20 +22,21 @@ from slipsweep.errors import InputError
 from slipsweep.grid import engine
 from slipsweep.grid.chunks import grid_chunks
 from slipsweep.grid.engine import Request, Variables
-from slipsweep.grid.inputs import Inputs, grid_sizes
+from slipsweep.grid.inputs import Inputs, given_inputs, grid_sizes
 from slipsweep.grid.plans import Plan, plan_sweep
 from slipsweep.model import options, parameters, units, variables
+from slipsweep.model.docstrings import with_parameters
 from slipsweep.model.variables import LimitStatus, Validity
 from slipsweep.motion.cutting import wave_of_record
 from slipsweep.motion.records import Record
-from slipsweep.studies import criterion, datasets
-from slipsweep.studies.datasets import Values
+from slipsweep.studies import limited_displacement
+from slipsweep.studies.sweeps import Excitation, Signs, Values, brought_coordinates, naming_choices
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-#: Cells, and intervals of amplitude in which they reach their targets: not at the lower end, but at
-#: the upper one.
+#: Cells, and intervals of amplitude: at the upper end a cell reaches its target, at the lower it
+#: does not.
 Steps = tuple[Indices, Floats, Floats]
 
 TITLE = "Amplitudes at which a tolerable displacement is reached"
@@ -57,19 +58,17 @@ SCANNED = 2_000_000
 _AFTER_SCAN = ("frequency", "time_scale", "structure_frequency", "displacement")
 
 
-@datasets.naming_choices
+@naming_choices
+@with_parameters
 def limit_amplitude(
     displacement: Values | str | Sequence[str],
     theta: Values | None = None,
     mu_s: Values | None = None,
     frequency: Values | None = None,
     *,
-    phi: Values | None = None,
-    excitation: datasets.Excitation = "sine",
+    excitation: Excitation = "sine",
     model: options.Model | str = "mendez",
-    time_scale: Values | None = None,
-    polarity: datasets.Signs | None = None,
-    azimuth: Values | None = None,
+    phi: Values | None = None,
     yield_acceleration: Values | None = None,
     yield_coefficient: Values | None = None,
     upslope_yield_acceleration: Values | None = None,
@@ -82,6 +81,9 @@ def limit_amplitude(
     fast_mu: Values | None = None,
     rate_constant: Values | None = None,
     structure_frequency: Values | None = None,
+    time_scale: Values | None = None,
+    polarity: Signs | None = None,
+    azimuth: Values | None = None,
     maximum_amplitude: float | None = None,
     amplitude_steps: int = AMPLITUDE_STEPS,
     progress: Callable[[int], None] | None = None,
@@ -90,7 +92,7 @@ def limit_amplitude(
 
     The inverse of `sweep`, exact to the last bit: `sweep` with the cycle solver gives at least
     `displacement` at the amplitude returned, and less (or no value) at the double-precision number
-    before it.
+    before it.  The other parameters are those of `sweep`.
 
     The displacement u(A) need not grow with A, jumps where the sliding mode changes, and has gaps
     where the model gives no value (`validity`), so that a displacement may be reached at several
@@ -106,13 +108,12 @@ def limit_amplitude(
     ----------
     displacement : float, array or DataArray, str or list of str
         Tolerable permanent displacement, > 0, m or with a unit ("50mm").
-    theta, mu_s, frequency : float, array or DataArray
-        These and the remaining parameters as in `sweep`; the solver is "cycle".  A record has a
-        `time_scale` instead.
     maximum_amplitude : float, optional
         Where the search ends, m/s²; by default 5 g.
     amplitude_steps : int
         Steps of the scan, 2 or more.
+    progress : callable, optional
+        Called with the number of cells just finished, from any thread.
 
     Returns
     -------
@@ -120,12 +121,13 @@ def limit_amplitude(
         Dimensions theta, mu_s, frequency, then others, displacement last:
 
         - `limit_amplitude`, m/s²; NaN where there is none.
-        - `limit_status`: 0 reached, 1 at_mode_jump, 2 at_jump (u rises by more than 1e-6 of itself between neighbouring
-          numbers, with and without a change of sliding mode), 3 after_gap (no value just below), 4
-          not_reached, 5 invalid (no value anywhere).
-        - `permanent_displacement`, m, and `sliding_mode` (under a record the counts of slips and pulses) at the
-          limit; more than `displacement` where a discontinuity of the model sets the limit.  Of a
-          block that slides both ways also `largest_displacement` and `smallest_displacement`.
+        - `limit_status`: 0 reached, 1 at_mode_jump, 2 at_jump (u rises by more than 1e-6 of itself
+          between neighbouring numbers, with and without a change of sliding mode), 3 after_gap (no
+          value just below), 4 not_reached, 5 invalid (no value anywhere).
+        - `permanent_displacement`, m, and `sliding_mode` (under a record the counts of slips and
+          pulses) at the limit; more than `displacement` where a discontinuity of the model sets the
+          limit.  Of a block that slides both ways also `largest_displacement` and
+          `smallest_displacement`.
         - `validity` at the limit or, where there is none, at `maximum_amplitude`.
 
     Raises
@@ -145,27 +147,7 @@ def limit_amplitude(
     >>> limits.limit_amplitude.round(3).values
     array([3.34 , 3.756])
     """
-    inputs = Inputs(
-        theta=theta,
-        mu_s=mu_s,
-        phi=phi,
-        frequency=frequency,
-        time_scale=time_scale,
-        polarity=polarity,
-        azimuth=azimuth,
-        yield_acceleration=yield_acceleration,
-        yield_coefficient=yield_coefficient,
-        upslope_yield_acceleration=upslope_yield_acceleration,
-        decay_rate=decay_rate,
-        delta_mu=delta_mu,
-        minimum_friction=minimum_friction,
-        residual_mu=residual_mu,
-        residual_phi=residual_phi,
-        weakening_distance=weakening_distance,
-        fast_mu=fast_mu,
-        rate_constant=rate_constant,
-        structure_frequency=structure_frequency,
-    )
+    inputs = given_inputs(locals())
     plan = plan_limits(
         displacement,
         inputs,
@@ -174,9 +156,7 @@ def limit_amplitude(
         maximum_amplitude=maximum_amplitude,
         amplitude_steps=amplitude_steps,
     )
-    return plan.solve(progress).assign_coords(
-        datasets.brought_coordinates(inputs, plan.coords, plan.names)
-    )
+    return plan.solve(progress).assign_coords(brought_coordinates(inputs, plan.coords, plan.names))
 
 
 def plan_limits(
@@ -188,15 +168,17 @@ def plan_limits(
     maximum_amplitude: float | None = None,
     amplitude_steps: int = AMPLITUDE_STEPS,
 ) -> Plan:
-    """Plan of `limit_amplitude`, as which parameters and errors are; `inputs` have no strength of the shaking."""
+    """Return the plan of `limit_amplitude`; same parameters and errors.
+
+    `inputs` have no strength of the shaking.
+    """
 
     target = check_displacement(displacement)
     dims = target.dims
     values = target.values
     steps = parameters.check_whole("amplitude_steps", amplitude_steps, 2, 1_000_000)
-    # displacement and amplitude change places: in the layout of the grid it stands where the
-    # amplitude would
-    swapped = replace(inputs, amplitude=xr.Variable(dims, values))
+    # the displacement takes the place of the amplitude among the dimensions of the grid
+    swapped = {**inputs, "amplitude": xr.Variable(dims, values)}
     plan = plan_sweep(
         swapped, excitation=excitation, model=model, variables=["permanent_displacement"]
     )
@@ -206,16 +188,18 @@ def plan_limits(
     highest = parameters.check_single("maximum_amplitude", maximum_amplitude)
     solved = dict(request.inputs)
     solved["displacement"] = solved.pop("amplitude")
-    blocks = grid_sizes({name: one for name, one in solved.items() if name not in _AFTER_SCAN})
+    blocks = grid_sizes(
+        {name: variable for name, variable in solved.items() if name not in _AFTER_SCAN}
+    )
     scaled = {dim: size for dim, size in plan.sizes.items() if dim not in blocks}
-    # in which mode a block slides, or in how many pulses of a record
+    # the sliding mode, or under a record the numbers of pulses
     codes = variables.RECORD_COUNTS if "time_scale" in solved else ("sliding_mode",)
     extremes = variables.EXTREMES if options.slides_both_ways(request.problem.model) else ()
     names = (*variables.LIMIT_RESULTS, *extremes, *codes, "validity")
-    request = replace(request, inputs=solved, wanted=names)
+    request = replace(request, inputs=solved, names=names)
     return replace(
         plan,
-        coords={name: one for name, one in plan.coords.items() if name != "amplitude"}
+        coords={name: variable for name, variable in plan.coords.items() if name != "amplitude"}
         | {"displacement": target},
         tasks=((partial(_solve, highest, steps), request),),
         names=names,
@@ -224,7 +208,7 @@ def plan_limits(
             "title": TITLE,
             "maximum_amplitude": highest,
             "amplitude_steps": steps,
-            **criterion.attributes_of(request.problem.model),
+            **limited_displacement.attributes_of(request.problem.model),
         },
         # one scan of a block serves all its targets, each of which takes some 100 cells in addition
         cost=plan.cost * (max(1.0, steps / math.prod(scaled.values())) + 100.0),
@@ -259,7 +243,10 @@ def check_displacement(displacement: Any) -> xr.Variable:
 
 
 def _solve(maximum_amplitude: float, steps: int, request: Request) -> Variables:
-    """Limit amplitudes of a grid, whose inputs have the `displacement` to be reached in place of the amplitude."""
+    """Return the limit amplitudes of a grid.
+
+    Its inputs have the `displacement` to be reached in place of the amplitude.
+    """
     results = request.results()
     for where, motion in engine.motions(request):
         # two thresholds of a pulse, and two sides of each, in addition to the steps
@@ -273,23 +260,23 @@ def _solve(maximum_amplitude: float, steps: int, request: Request) -> Variables:
 
 
 def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> dict[str, NDArray[Any]]:
-    """Limit amplitudes of a part of a grid that one motion shakes."""
+    """Return the limit amplitudes of a part of a grid that one motion shakes."""
     scan = Scan(request, maximum_amplitude, steps)
     cell, low, high = _limits(scan)
-    wanted = tuple(name for name in request.wanted if not name.startswith("limit_"))
-    before = scan.solve(low, cell, wanted)
-    after = scan.solve(high, cell, wanted)
-    results = {name: one.data.ravel() for name, one in request.results().items()}
+    names = tuple(name for name in request.names if not name.startswith("limit_"))
+    before = scan.solve(low, cell, names)
+    after = scan.solve(high, cell, names)
+    results = {name: variable.data.ravel() for name, variable in request.results().items()}
     for values in results.values():
         values[:] = math.nan if values.dtype.kind == "f" else variables.SlidingMode.MISSING
     # without a limit the validity at the maximum amplitude says why
-    results["validity"][:] = scan.found["validity"][:, -1]
+    results["validity"][:] = scan.results["validity"][:, -1]
     valueless = np.isnan(scan.displacements).all(axis=1)
     results["limit_status"][:] = np.where(valueless, LimitStatus.INVALID, LimitStatus.NOT_REACHED)
     for name, values in {**after, "limit_amplitude": high}.items():
         results[name][cell] = values
-    below = criterion.displacement_of(before)
-    above = criterion.displacement_of(after)
+    below = limited_displacement.displacement_of(before)
+    above = limited_displacement.displacement_of(after)
     with np.errstate(invalid="ignore"):
         jumps = (above - below > JUMP * above) | np.isinf(above)  # it does not come to rest
     modes = [
@@ -306,7 +293,7 @@ def _solve_part(request: Request, maximum_amplitude: float, steps: int) -> dict[
 
 
 class Scan:
-    """Cells that one motion shakes, at increasing amplitudes: those of a part of a grid."""
+    """Displacements of the cells of a part of a grid, under one motion of increasing amplitude."""
 
     def __init__(self, request: Request, maximum_amplitude: float, steps: int) -> None:
         self.problem = request.problem
@@ -317,67 +304,72 @@ class Scan:
         # are solved once
         every = inputs | {"amplitude": amplitudes}
         slips = ("number_of_slips",) if isinstance(self.problem.excitation, Record) else ()
-        self.moved = criterion.results_of(self.problem.model)
-        wanted = (*self.moved, "validity", *slips)
-        found = engine.solve(Request(self.problem, grid_sizes(every), every, wanted))
+        self.moved = limited_displacement.results_of(self.problem.model)
+        names = (*self.moved, "validity", *slips)
+        results = engine.solve(Request(self.problem, grid_sizes(every), every, names))
         full = {**request.sizes, _ALONG: amplitudes.sizes[_ALONG]}
         #: Results and amplitudes, (cell, amplitude).
-        self.found = {
-            name: one.set_dims(full).values.reshape(-1, full[_ALONG])
-            for name, one in (*found.items(), ("amplitude", amplitudes))
+        self.results = {
+            name: variable.set_dims(full).values.reshape(-1, full[_ALONG])
+            for name, variable in (*results.items(), ("amplitude", amplitudes))
         }
-        self.amplitudes = self.found["amplitude"]
+        self.amplitudes = self.results["amplitude"]
         #: Displacements that are compared with those to be reached, (cell, amplitude).
-        self.displacements = criterion.displacement_of(self.found)
+        self.displacements = limited_displacement.displacement_of(self.results)
         #: Displacements to be reached, (cell,).
         self.targets = displacement.set_dims(request.sizes).values.ravel()
         #: Inputs but for the amplitude: one value for each cell, or one for all.
         self.inputs = {
-            name: xr.Variable("cell", one.set_dims(request.sizes).values.ravel())
-            if one.dims
-            else one
-            for name, one in inputs.items()
+            name: xr.Variable("cell", variable.set_dims(request.sizes).values.ravel())
+            if variable.dims
+            else variable
+            for name, variable in inputs.items()
         }
 
     def solve(
-        self, amplitude: Floats, cell: Indices, wanted: tuple[str, ...]
+        self, amplitude: Floats, cell: Indices, names: tuple[str, ...]
     ) -> dict[str, NDArray[Any]]:
-        """Results of some cells, each at its own amplitudes (rows of the array)."""
+        """Return results of some cells, each at its own amplitudes (a row of the array)."""
         dims = ("cell", _ALONG)[: amplitude.ndim]
-        inputs = {name: one[cell] if one.dims else one for name, one in self.inputs.items()}
+        inputs = {
+            name: variable[cell] if variable.dims else variable
+            for name, variable in self.inputs.items()
+        }
         inputs["amplitude"] = xr.Variable(dims, amplitude)
-        found = engine.solve(
-            Request(self.problem, dict(zip(dims, amplitude.shape, strict=True)), inputs, wanted)
+        results = engine.solve(
+            Request(self.problem, dict(zip(dims, amplitude.shape, strict=True)), inputs, names)
         )
-        return {name: one.values for name, one in found.items()}
+        return {name: variable.values for name, variable in results.items()}
 
     def reach(self, amplitude: Floats, cell: Indices) -> NDArray[np.bool_]:
         """Return True where cells reach their targets at amplitudes of their own."""
-        moved = criterion.displacement_of(self.solve(amplitude, cell, self.moved))
+        moved = limited_displacement.displacement_of(self.solve(amplitude, cell, self.moved))
         return np.asarray(moved >= self.targets[cell].reshape(-1, *(1,) * (amplitude.ndim - 1)))
 
 
 def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) -> xr.Variable:
-    """Amplitudes to try, with both sides of every change of mode: along a dimension of their own, the last one.
+    """Return the amplitudes of the scan, with both sides of every change of mode.
 
-    The other dimensions are those of the grid along which more than the target and the time scale
-    varies.
+    They lie along the last dimension.  The other dimensions are those of the grid along which more
+    than the target and the time scale varies.
     """
     problem = request.problem
-    blocks = {name: one for name, one in request.inputs.items() if name not in _AFTER_SCAN}
+    blocks = {
+        name: variable for name, variable in request.inputs.items() if name not in _AFTER_SCAN
+    }
     sizes = {dim: size for dim, size in request.sizes.items() if dim in grid_sizes(blocks)}
     # Newmark's block has no limiting acceleration, and may have no θ and μs that one would follow
     # from
     limited = ("limiting_acceleration",) if not isinstance(problem.model, options.Newmark) else ()
-    wanted = ("yield_acceleration", *limited)
+    names = ("yield_acceleration", *limited)
     blocks["amplitude"] = xr.Variable((), 0.0)
-    found = engine.friction_parameters(Request(problem, sizes, blocks, wanted))
-    # a pulse begins to count, or changes its mode, where its own peak passes Üy or Üg,lim, which do
+    accelerations = engine.friction_parameters(Request(problem, sizes, blocks, names))
+    # a pulse begins to slide, or changes its mode, where its own peak passes Üy or Üg,lim; these do
     # not depend on A
-    thresholds = np.stack([found[name].values.ravel() for name in wanted], axis=1)
+    thresholds = np.stack([accelerations[name].values.ravel() for name in names], axis=1)
     yields = thresholds[:, :1]
     if options.slides_both_ways(problem.model):
-        arrays = {name: one.set_dims(sizes).values for name, one in blocks.items()}
+        arrays = {name: variable.set_dims(sizes).values for name, variable in blocks.items()}
         upslope = engine.cell_inputs(problem, arrays)["upslope_yield_acceleration"]
         lowest = np.minimum(yields, np.broadcast_to(upslope, [*sizes.values()]).reshape(-1, 1))
         yields = np.where(yields > 0.0, lowest, yields)
@@ -402,7 +394,10 @@ def _scanned_amplitudes(request: Request, maximum_amplitude: float, steps: int) 
 
 
 def _heights(request: Request) -> Floats:
-    """Heights of the 128 highest pulses (noise has thousands), in parts of the motion's amplitude, increasing."""
+    """Return the heights of the 128 highest pulses, in parts of the motion's amplitude.
+
+    They increase.  A record with noise has thousands of pulses.
+    """
     motion = request.problem.excitation
     if not isinstance(motion, Record):
         return np.ones(1)
@@ -413,24 +408,26 @@ def _heights(request: Request) -> Floats:
 
 
 def _limits(scan: Scan) -> Steps:
-    """The lowest neighbouring amplitudes between which cells reach their targets, of those cells that do."""
+    """Return the cells that reach their targets, and neighbouring amplitudes between which they do.
+
+    They are the lowest such amplitudes.
+    """
     reaches = scan.displacements >= scan.targets[:, np.newaxis]
     reached = np.logical_or.accumulate(reaches, axis=1)
     # the scan begins at yield, where no block has moved: there is always a step before
     before = ~reached[:, :-1]
     cell, step = np.nonzero(before & reached[:, 1:])
-    found = [
+    steps = [
         (cell, scan.amplitudes[cell, step], scan.amplitudes[cell, step + 1]),
         *_hidden_peaks(scan, before),
     ]
-    # in the gap of the literal rise Kd would be negative: at its edges Kd vanishes, and u grows
-    # beyond all bounds
-    found.append(_at_change(scan, before, "validity", bits=Validity.KD_NOT_POSITIVE.value))
+    # the literal rise has a gap where Kd is negative: at its edges Kd is 0, and u infinite
+    steps.append(_at_change(scan, before, "validity", bits=Validity.KD_NOT_POSITIVE.value))
     if (
-        "number_of_slips" in scan.found
+        "number_of_slips" in scan.results
     ):  # where it changes, u jumps; under a waveform such jumps are hidden peaks
-        found.append(_at_change(scan, before, "number_of_slips", least=0.25, part=1e-5))
-    cells, low, high = (np.concatenate(values) for values in zip(*found, strict=True))
+        steps.append(_at_change(scan, before, "number_of_slips", least=0.25, part=1e-5))
+    cells, low, high = (np.concatenate(values) for values in zip(*steps, strict=True))
     order = np.argsort(high, kind="stable")
     cell, at = np.unique(cells[order], return_index=True)
     lowest = order[at]
@@ -440,29 +437,31 @@ def _limits(scan: Scan) -> Steps:
 
 
 def _hidden_peaks(scan: Scan, before: NDArray[np.bool_]) -> Iterator[Steps]:
-    """Parts of steps in which a target is reached, `before` (cell, step) the scan itself reaches it."""
-    # blocks that do not recouple: u jumps up each time that they come to rest one pulse earlier,
-    # and then falls
+    """Yield parts of steps in which a target is reached beside a peak between two amplitudes.
+
+    `before`, (cell, step), is True as long as the scan itself has not reached the target.
+    """
+    # if a block does not recouple, u jumps up where it comes to rest one pulse earlier, then falls
     saw, parts = (0.7, 128) if isinstance(scan.problem.excitation, Record) else (0.5, 512)
     moved = scan.displacements
-    slides_on = scan.found["validity"] & Validity.NOT_RECOUPLED.value != 0
-    # the part of a target from which on a point may lie next to a peak, and a maximum of the scan
-    # to a higher one
+    slides_on = scan.results["validity"] & Validity.NOT_RECOUPLED.value != 0
+    # from this part of a target on, a point may lie next to a peak, or a maximum next to a higher
+    # one
     least = np.where(slides_on, saw, np.inf)
     peaks = (moved[:, 1:-1] > moved[:, :-2]) & (moved[:, 1:-1] > moved[:, 2:])
     least[:, 1:-1][peaks & ~slides_on[:, 1:-1]] = 0.9
     near = moved >= least * scan.targets[:, np.newaxis]
     cell, step = np.nonzero((near[:, 1:] | near[:, :-1]) & before)
     for chunk in grid_chunks({"cell": cell.size}, SCANNED // parts):
-        own = cell[chunk["cell"]]
+        cells = cell[chunk["cell"]]
         begin = step[chunk["cell"]]
         amplitudes = np.linspace(
-            scan.amplitudes[own, begin], scan.amplitudes[own, begin + 1], parts + 1, axis=1
+            scan.amplitudes[cells, begin], scan.amplitudes[cells, begin + 1], parts + 1, axis=1
         )
-        reaches = scan.reach(amplitudes, own)
+        reaches = scan.reach(amplitudes, cells)
         (which,) = np.nonzero(reaches.any(axis=1) & ~reaches[:, 0])
         first = reaches[which].argmax(axis=1)
-        yield own[which], amplitudes[which, first - 1], amplitudes[which, first]
+        yield cells[which], amplitudes[which, first - 1], amplitudes[which, first]
 
 
 def _at_change(
@@ -474,31 +473,33 @@ def _at_change(
     least: float = 0.0,
     part: float = 0.0,
 ) -> Steps:
-    """Steps up to the last amplitude before a change of a result, or to the first after it, that reaches a target.
+    """Return steps that reach a target at a change of a result, just before it or just after it.
 
-    The place of the change is located, to a `part` of the step, where u on either side of it is
-    `least` of the target.
+    The place of the change is located to a `part` of the step, if u on one side of it is at least
+    the part `least` of the target.
     """
     moved = scan.displacements
-    states = scan.found[result] & bits
+    states = scan.results[result] & bits
     cell, step = np.nonzero(states[:, 1:] != states[:, :-1])
     higher = np.maximum(moved[cell, step + 1], moved[cell, step])
-    # no comparison holds for the NaN of a gap: its edges are located
+    # a gap is NaN, and no comparison with NaN is true: its edges are located, too
     may = before[cell, step] & ~(higher < least * scan.targets[cell])
     cell = cell[may]
     step = step[may]
     start = scan.amplitudes[cell, step]
     end = scan.amplitudes[cell, step + 1]
-    known = states[cell, step]
+    state_before = states[cell, step]
 
     def changed(amplitude: Floats, which: Indices) -> NDArray[np.bool_]:
         there = scan.solve(amplitude, cell[which], (result,))[result] & bits
-        return np.asarray(there != known[which])
+        return np.asarray(there != state_before[which])
 
     low, high = _bisected(start, end, changed, part * (end - start))
     at_low = scan.reach(low, cell)
-    found = at_low | scan.reach(high, cell)
-    return cell[found], np.where(at_low, start, low)[found], np.where(at_low, low, high)[found]
+    reaches = at_low | scan.reach(high, cell)
+    lower = np.where(at_low, start, low)
+    upper = np.where(at_low, low, high)
+    return cell[reaches], lower[reaches], upper[reaches]
 
 
 def _bisected(
@@ -507,9 +508,10 @@ def _bisected(
     changed: Callable[[Floats, Indices], NDArray[np.bool_]],
     width: Floats | float = 0.0,
 ) -> tuple[Floats, Floats]:
-    """Halve intervals until their ends are neighbours in double precision, or no further apart than `width`.
+    """Halve intervals until their ends are neighbours in double precision, or `width` apart.
 
-    `changed`, of amplitudes and the indices of their intervals, holds at `high` and not at `low`.
+    `changed` takes amplitudes and the indices of their intervals; it is True at `high`, not at
+    `low`.
     """
     low = low.copy()
     high = high.copy()

@@ -11,6 +11,7 @@ import xarray as xr
 from slipsweep.errors import InputError
 from slipsweep.model.options import Mendez
 from slipsweep.model.parameters import check_numbers, number_text, shown
+from slipsweep.model.units import in_mm
 from slipsweep.model.variables import (
     PUBLISHED_RESULTS,
     STATISTIC_COORDINATES,
@@ -18,7 +19,6 @@ from slipsweep.model.variables import (
 )
 from slipsweep.motion.waveforms import peak_acceleration
 from slipsweep.published import EQUATIONS, INPUTS, Estimate, check_equations
-from slipsweep.studies.datasets import friction_parameters
 from slipsweep.studies.sampling import Thresholds, check_increasing, check_thresholds
 from slipsweep.studies.suite_statistics import (
     QUANTILES,
@@ -27,13 +27,14 @@ from slipsweep.studies.suite_statistics import (
     labels_along,
     suite_statistics,
 )
+from slipsweep.studies.sweeps import friction_parameters
 
 if TYPE_CHECKING:
     import pandas as pd
 
 TITLE = "Published equations for the permanent displacement of a rigid block"
 
-#: Statistics that an equation has, as a suite has them.
+#: Statistics of a suite that an equation has, too.
 _STATISTICS = (
     "zero_probability",
     "nonzero_median",
@@ -121,7 +122,7 @@ def published_statistics(
     each = estimates(result, names, magnitude)
     parts = []
     for estimate in each.values():
-        found = xr.Dataset(
+        statistics = xr.Dataset(
             {
                 "zero_probability": estimate.zero_probability,
                 "nonzero_median": estimate.median,
@@ -131,8 +132,8 @@ def published_statistics(
                 "exceedance_probability": _with(estimate, estimate.exceedance_probability, limits),
             }
         )
-        parts.append(found)
-    grid = [dim for dim in result.dims if any(dim in one["in_range"].dims for one in parts)]
+        parts.append(statistics)
+    grid = [dim for dim in result.dims if any(dim in part["in_range"].dims for part in parts)]
     dataset = xr.concat(xr.broadcast(*parts, exclude=("threshold", "quantile")), "equation")
     dataset = dataset.transpose("equation", *grid, ...)
     dataset["in_range"] = dataset["in_range"].astype(np.int8)
@@ -140,11 +141,11 @@ def published_statistics(
         dataset[name].attrs = SUITE_STATISTICS[name]
     dataset["in_range"].attrs = PUBLISHED_RESULTS["in_range"]
     coords = {
-        name: one.variable
-        for name, one in result.coords.items()
-        if {*one.dims} <= {*grid} and name not in SUITE
+        name: coordinate.variable
+        for name, coordinate in result.coords.items()
+        if {*coordinate.dims} <= {*grid} and name not in SUITE
     }
-    own = {
+    statistic_coords = {
         dim: xr.Variable(dim, values.values, STATISTIC_COORDINATES[dim])
         for dim, values in (("threshold", limits), ("quantile", shares))
     }
@@ -152,14 +153,17 @@ def published_statistics(
     attrs = {**result.attrs, "title": TITLE, "conditions": "\n".join(conditions_texts(names))}
     if magnitude is not None:
         attrs["magnitude"] = float(magnitude)
-    return dataset.assign_coords(coords | own | labels).assign_attrs(attrs)
+    return dataset.assign_coords(coords | statistic_coords | labels).assign_attrs(attrs)
 
 
 def estimates(
     result: xr.Dataset, names: Sequence[str], magnitude: float | None = None
 ) -> dict[str, Estimate]:
-    """Estimates by equations at the points of a result: DataArrays along the inputs' dimensions."""
-    found = {}
+    """Return estimates by equations at the points of a result.
+
+    They are DataArrays along the dimensions of the inputs.
+    """
+    by_name = {}
     for name in names:
         equation = EQUATIONS[name]
         available = {} if magnitude is None else {"magnitude": _magnitude(magnitude)}
@@ -174,17 +178,17 @@ def estimates(
                 raise InputError(f"{name}: needs {INPUTS[needed]} ({needed}): {hint}")
         broadcast = xr.broadcast(*arrays.values())
         values: dict[str, Any] = {
-            needed: one.values for needed, one in zip(arrays, broadcast, strict=True)
+            needed: array.values for needed, array in zip(arrays, broadcast, strict=True)
         }
         if "g" in inspect.signature(equation.function).parameters:
             values["g"] = float(result.attrs["g"])
         estimate = equation.function(**values)
-        found[name] = Estimate(*(xr.DataArray(one, dims=broadcast[0].dims) for one in estimate))
-    return found
+        by_name[name] = Estimate(*(xr.DataArray(part, dims=broadcast[0].dims) for part in estimate))
+    return by_name
 
 
 def conditions_texts(names: Sequence[str]) -> list[str]:
-    """Sentences: that equations are for other conditions than one's block, and for which."""
+    """Return sentences on the conditions that the equations are for."""
     texts = ["Published equations are for other conditions: Newmark's rigid block, other shaking."]
     for name in names:
         equation = EQUATIONS[name]
@@ -199,7 +203,9 @@ def published_table(
     magnitude: float | None = None,
     thresholds: Thresholds | None = None,
 ) -> "pd.DataFrame":
-    """Displacements in rows: at each grid point of the result's own suite and of each equation.
+    """Return displacements in rows, of the result's own suite and of each equation.
+
+    There is a row for each grid point.
 
     Columns: the axes, ``displacement of``, the quantiles (mm), the probability of zero and of
     exceeding `thresholds`, and ``range``, which is "outside" where an equation is extrapolated.
@@ -208,14 +214,17 @@ def published_table(
 
     names = check_equations(equations)
     limits = [] if thresholds is None else thresholds
-    found = published_statistics(result, names, magnitude=magnitude, thresholds=limits or 0.0)
-    sources = {EQUATIONS[name].label: found.sel(equation=name) for name in names}
+    by_equations = published_statistics(
+        result, names, magnitude=magnitude, thresholds=limits or 0.0
+    )
+    sources = {EQUATIONS[name].label: by_equations.sel(equation=name) for name in names}
     if result.sizes.get("motion", 1) > 1:
-        own = suite_statistics(result, thresholds=limits or 0.0)
-        sources = {"this suite": own.assign(in_range=xr.ones_like(own["value_count"]))} | sources
-    parts = [_columns(one, bool(limits)) for one in sources.values()]
+        of_suite = suite_statistics(result, thresholds=limits or 0.0)
+        of_suite = of_suite.assign(in_range=xr.ones_like(of_suite["value_count"]))
+        sources = {"this suite": of_suite} | sources
+    parts = [_columns(source, bool(limits)) for source in sources.values()]
     whole = xr.concat(parts, pd.Index([*sources], name="displacement of"))
-    # in the order of the result; axes of one value are said elsewhere
+    # in the order of the result, without axes of one value
     axes = [str(dim) for dim in result.dims if whole.sizes.get(dim, 1) > 1]
     single = [dim for dim in whole.dims if dim not in (*axes, "displacement of")]
     laid = whole.squeeze(single, drop=True).assign_coords(
@@ -226,18 +235,18 @@ def published_table(
     return table.rename(columns={dim: axis_title(result, dim) for dim in axes})
 
 
-def _columns(found: xr.Dataset, exceeded: bool) -> xr.Dataset:
-    """Quantiles in mm and probabilities of statistics, by the titles of a table."""
+def _columns(statistics: xr.Dataset, exceeded: bool) -> xr.Dataset:
+    """Return quantiles in mm and probabilities by the titles of a table."""
     columns: dict[str, xr.DataArray] = {}
-    for share in found["quantile"].values:
+    for share in statistics["quantile"].values:
         title = "median (mm)" if share == 0.5 else f"{100.0 * share:.3g} % (mm)"
-        quantile = found["displacement_quantile"].sel(quantile=share, drop=True)
-        columns[title] = 1000.0 * quantile
-    columns["zero"] = found["zero_probability"]
-    for limit in found["threshold"].values if exceeded else ():
-        title = f"P(u > {1000.0 * limit:.6g} mm)"
-        columns[title] = found["exceedance_probability"].sel(threshold=limit, drop=True)
-    columns["range"] = found["in_range"]
+        quantile = statistics["displacement_quantile"].sel(quantile=share, drop=True)
+        columns[title] = in_mm(quantile)
+    columns["zero"] = statistics["zero_probability"]
+    for limit in statistics["threshold"].values if exceeded else ():
+        title = f"P(u > {in_mm(limit):.6g} mm)"
+        columns[title] = statistics["exceedance_probability"].sel(threshold=limit, drop=True)
+    columns["range"] = statistics["in_range"]
     return xr.Dataset(columns).reset_coords(drop=True)
 
 
@@ -248,10 +257,10 @@ def published_lines(
     thresholds: Thresholds | None = None,
     most: int = 100,
 ) -> list[str]:
-    """The table of `published_table` in lines, and what the equations are for."""
+    """Return the table of `published_table` in lines, and the conditions of the equations."""
     names = check_equations(equations)
-    found = published_statistics(result, names, magnitude=magnitude)
-    points = found["in_range"].isel(equation=0).size
+    by_equations = published_statistics(result, names, magnitude=magnitude)
+    points = by_equations["in_range"].isel(equation=0).size
     if points > most:
         how = "--at NAME=VALUE takes those of some"
         return [f"published equations at {points} grid points: {how}"]
@@ -259,7 +268,7 @@ def published_lines(
     for title in table.select_dtypes("float"):
         is_share = title == "zero" or title.startswith("P(")
         as_text = ".1%" if is_share else ".3g" if title.endswith("(mm)") else ".4g"
-        table[title] = [_number(one, as_text) for one in table[title]]
+        table[title] = [_number(value, as_text) for value in table[title]]
     if not table["range"].any():
         table = table.drop(columns="range")
     outside = (
@@ -278,23 +287,23 @@ def _number(value: float, as_text: str) -> str:
 
 
 def axis_labels_of(result: xr.Dataset, dim: str) -> list[Any]:
-    """Places along an axis: numbers, peak ground accelerations in g, or labels."""
+    """Return places along an axis: numbers, peak ground accelerations in g, or labels."""
     if dim in result.variables and result[dim].dtype.kind in "iuf":
         factor = float(result.attrs["g"]) if dim == "amplitude" else 1.0
-        return [float(one) / factor for one in result[dim].values]
+        return [float(value) / factor for value in result[dim].values]
     return labels_along(result, dim)
 
 
 def axis_title(result: xr.Dataset, dim: str) -> str:
-    """The title of an axis: its name and unit."""
+    """Return the title of an axis: its name and unit."""
     names = {"amplitude": "PGA (g)", "yield_coefficient": "ky"}
     units = result[dim].attrs.get("units", "1") if dim in result.variables else "1"
     return names.get(dim, dim if units == "1" else f"{dim} ({units})")
 
 
 def _with(estimate: Estimate, method: Callable[[Any], Any], more: xr.DataArray) -> xr.DataArray:
-    """A method of an estimate at several values, along their own dimension."""
-    values = np.stack([method(float(one)) for one in more.values], axis=-1)
+    """Return a method of an estimate at several values, along their own dimension."""
+    values = np.stack([method(float(value)) for value in more.values], axis=-1)
     return xr.DataArray(values, dims=(*estimate.median.dims, *more.dims))
 
 
@@ -308,36 +317,36 @@ def _magnitude(magnitude: Any) -> xr.DataArray:
     return xr.DataArray(values)
 
 
-# ------------------------------------------------------- what equations take from a result
+# ------------------------------------------------------- inputs of equations from a result
 
 
 def _input(result: xr.Dataset, name: str) -> xr.DataArray | None:
-    """An input of equations at the points of a result, without coordinates; None if not there."""
+    """Return an input of equations at the points of a result, or None; it has no coordinates."""
     array = _FROM_RESULT[name](result) if name in _FROM_RESULT else None
     return None if array is None else array.astype(np.float64).drop_vars([*array.coords])
 
 
 def _yield_coefficient(result: xr.Dataset) -> xr.DataArray | None:
-    """Üy/g, NaN where the block slides under its own weight."""
+    """Return Üy/g, NaN where the block slides under its own weight."""
     g = float(result.attrs["g"])
     if "yield_coefficient" in result.coords:
-        found = result["yield_coefficient"]
+        coefficient = result["yield_coefficient"]
     elif "yield_acceleration" in result.coords:
-        found = result["yield_acceleration"] / g
+        coefficient = result["yield_acceleration"] / g
     elif {"theta", "mu_s"} <= {*result.coords}:
         block = {name: result[name].reset_coords(drop=True) for name in ("theta", "mu_s")}
         # neither the amplitude nor the friction law enters Coulomb's yield acceleration
         coulomb = friction_parameters(
             **block, amplitude=0.0, delta_mu=0.0, decay_rate=0.0, model=Mendez(g=g)
         )
-        found = coulomb["yield_acceleration"] / g
+        coefficient = coulomb["yield_acceleration"] / g
     else:
         return None
-    return found.where(found > 0.0)
+    return coefficient.where(coefficient > 0.0)
 
 
 def peak_acceleration_in_g(result: xr.Dataset) -> xr.DataArray | None:
-    """Peak ground acceleration in g; of motions that are scaled otherwise their median."""
+    """Return the peak ground acceleration in g; of motions with a `scale` their median."""
     g = float(result.attrs["g"])
     if "amplitude" in result.coords:
         return _shaken(result["amplitude"] / g)
@@ -348,7 +357,7 @@ def peak_acceleration_in_g(result: xr.Dataset) -> xr.DataArray | None:
 
 
 def _pgv(result: xr.Dataset) -> xr.DataArray | None:
-    """Peak ground velocity, m/s: of the scaling, the median of the motions, or of a waveform."""
+    """Return the peak ground velocity, m/s: that of the scaling, the motions or the waveform."""
     if "pgv" in result.coords:
         return _above_zero(result["pgv"])
     if "motion_pgv" in result.coords:
@@ -363,7 +372,7 @@ def _pgv(result: xr.Dataset) -> xr.DataArray | None:
 
 
 def _of_motions(result: xr.Dataset, measure: str, unit: Any) -> xr.DataArray | None:
-    """Median of a measure of the motions as they shake the block; None without their factors."""
+    """Return the median measure of the motions as they shake the block, or None."""
     if measure not in result.coords:
         return None
     if "scale" in result.coords:
@@ -379,26 +388,26 @@ def _of_motions(result: xr.Dataset, measure: str, unit: Any) -> xr.DataArray | N
 
 
 def _period(result: xr.Dataset) -> xr.DataArray | None:
-    """Period of a waveform whose cycles are equal, s."""
+    """Return the period of a waveform whose cycles are equal, s, or None."""
     is_plain = not (result.attrs.get("ramp_in") or result.attrs.get("ramp_out"))
     return 1.0 / result["frequency"] if "frequency" in result.coords and is_plain else None
 
 
 def _cycles(result: xr.Dataset) -> xr.DataArray | None:
-    """Number of equal cycles of a waveform."""
+    """Return the number of equal cycles of a waveform, or None."""
     if _period(result) is None or "cycles" not in result.attrs:
         return None
     return xr.DataArray(float(result.attrs["cycles"]))
 
 
 def _pulse_duration(result: xr.Dataset) -> xr.DataArray | None:
-    """Half a period of a waveform, s."""
+    """Return half a period of a waveform, s, or None."""
     period = _period(result)
     return None if period is None else 0.5 * period
 
 
 def _shaken(pga: xr.DataArray) -> xr.DataArray:
-    """Peak ground accelerations; in place of 0, by which equations divide, 1e-12 g."""
+    """Return peak ground accelerations, with 1e-12 g for 0, by which equations divide."""
     return pga.where(pga > 0.0, 1e-12)
 
 

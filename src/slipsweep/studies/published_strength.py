@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 TITLE = "Yield coefficient that published equations require for a tolerable displacement"
 
-#: ky/PGA of the scan, through ln(r/(1 − r)), and how often the step that holds the crossing is cut
+#: ky/PGA of the scan, in equal steps of ln(r/(1 − r)); times that the step with the crossing is cut
 #: into as many parts.
 _RATIOS = 1.0 / (1.0 + np.exp(-np.linspace(-9.0, 14.0, 512)))
 _NARROWINGS = 6
@@ -95,11 +95,11 @@ def published_strength(
     shares = check_increasing("quantiles", quantiles, "quantile")
     parts = []
     for name in names:
-        found = [strength_by(strengths, name, magnitude, float(share)) for share in shares]
+        by_share = [strength_by(strengths, name, magnitude, float(share)) for share in shares]
         dataset = xr.Dataset(
             {
-                _RESULT: xr.concat([strength for strength, _ in found], "quantile"),
-                "in_range": xr.concat([inside for _, inside in found], "quantile"),
+                _RESULT: xr.concat([strength for strength, _ in by_share], "quantile"),
+                "in_range": xr.concat([inside for _, inside in by_share], "quantile"),
             }
         )
         parts.append(dataset)
@@ -118,14 +118,14 @@ def published_strength(
         for name, coordinate in strengths.coords.items()
         if {*coordinate.dims} <= {*grid} and name not in SUITE
     }
-    own = {
+    statistic_coords = {
         "equation": list(names),
         "quantile": xr.Variable("quantile", shares, STATISTIC_COORDINATES["quantile"]),
     }
     attrs = {**strengths.attrs, "title": TITLE, "conditions": "\n".join(conditions_texts(names))}
     if magnitude is not None:
         attrs["magnitude"] = float(magnitude)
-    return table.assign_coords(coords | own).assign_attrs(attrs)
+    return table.assign_coords(coords | statistic_coords).assign_attrs(attrs)
 
 
 def strength_by(
@@ -133,7 +133,7 @@ def strength_by(
 ) -> tuple[xr.DataArray, xr.DataArray]:
     """Return ky at which an equation's quantile is the displacement, and if it is in range.
 
-    The largest such ky, if there are several: above it the quantile stays within.
+    If there are several such ky, it is the largest: above it the quantile stays within.
     """
     pga = peak_acceleration_in_g(strengths)
     if pga is None:
@@ -177,12 +177,12 @@ def strength_table(
     import pandas as pd
 
     shares = strengths["quantile"].values if _RESULT in strengths else QUANTILES
-    found = published_strength(strengths, equations, magnitude=magnitude, quantiles=shares)
-    sources = {EQUATIONS[name].label: found.sel(equation=name) for name in equations}
+    by_equations = published_strength(strengths, equations, magnitude=magnitude, quantiles=shares)
+    sources = {EQUATIONS[name].label: by_equations.sel(equation=name) for name in equations}
     if _RESULT in strengths:
         values = strengths[[_RESULT]]
-        own = values.assign(in_range=xr.ones_like(values[_RESULT]))
-        sources = {"these motions": own} | sources
+        of_suite = values.assign(in_range=xr.ones_like(values[_RESULT]))
+        sources = {"these motions": of_suite} | sources
     columns = []
     for source in sources.values():
         named: dict[str, Any] = {}
@@ -204,7 +204,7 @@ def strength_table(
 def strength_lines(
     strengths: xr.Dataset, equations: Sequence[str], magnitude: float | None = None
 ) -> list[str]:
-    """Return the table of `strength_table` in lines, and what the equations are for."""
+    """Return the table of `strength_table` in lines, and the conditions of the equations."""
     table = strength_table(strengths, equations, magnitude)
     outside = ["outside: an input lies outside of the range of the equation"]
     if not table["range"].any():

@@ -1,10 +1,9 @@
-"""Where a block that slides both ways would also slide upslope, which neither model lets it do.
+"""Sliding upslope, which a block under both models leaves out.
 
 Both models let a block slide downslope only, but for continuous sliding by the paper's law.  On a
 level or gentle base a block also slides back, and ends near where it began.
 """
 
-import inspect
 from typing import Any
 
 import numpy as np
@@ -19,24 +18,20 @@ from slipsweep.motion.records import Record
 from slipsweep.motion.suites import Pair, Suite
 from slipsweep.motion.waveforms import WAVEFORMS, peak_acceleration
 
-#: Equations as they are written: compiled ones take single numbers, and a second to compile.
-_coulomb: Any = inspect.unwrap(equations.coulomb_yield_acceleration)
-_limit_denominator: Any = inspect.unwrap(equations.limit_denominator)
-
 
 def upslope_yield_acceleration(
     yield_acceleration: xr.DataArray, theta: xr.DataArray, g: float
 ) -> xr.DataArray:
-    """Acceleration of the base beyond which a block slides upslope, m/s², from that for downslope.
+    """Return the acceleration of the base beyond which a block slides upslope, m/s².
 
-    By statics g tan(arctan(Üy/g) + 2θ), which is g tan(φs + θ) with Coulomb's Üy; `theta` is in
-    degrees.  Infinite where the angle reaches 90°.
+    It follows from Üy by statics, g tan(arctan(Üy/g) + 2θ), which is g tan(φs + θ) with Coulomb's
+    Üy; `theta` is in degrees.  Infinite where the angle reaches 90°.
     """
     tan_theta = xr.apply_ufunc(np.tan, np.radians(1.0) * theta)
 
     def by_statics(onset: Any, tangent: Any) -> Any:
-        given = {"yield_acceleration": onset, "tan_theta": tangent}
-        return engine.upslope_yield_acceleration(given, g)
+        interface = {"yield_acceleration": onset, "tan_theta": tangent}
+        return engine.upslope_yield_acceleration(interface, g)
 
     onset: xr.DataArray = xr.apply_ufunc(by_statics, yield_acceleration, tan_theta)
     return onset
@@ -73,33 +68,38 @@ def sliding_ways(
     if "yield_acceleration" in data.coords:
         onset = _values(data, "yield_acceleration")
     else:
-        onset = _coulomb(_values(data, "mu_s"), tan_theta, g)
+        onset = xr.apply_ufunc(
+            equations.coulomb_yield_acceleration, _values(data, "mu_s"), tan_theta, g
+        )
     onset = onset.where(onset > 0.0)
     slides = peaks[0] > onset
     slides_back = peaks[1] > upslope_yield_acceleration(onset, theta, g)
     if WAVEFORMS.attribute in data.attrs and data.attrs["model"] == Mendez.name:
         mu_s = _values(data, "mu_s")
         in_contact = _amplitude(data) * tan_theta < g
-        limit = (onset + g * mu_s) / _limit_denominator(mu_s, tan_theta)  # Eq. 7
+        limit = xr.apply_ufunc(equations.limiting_acceleration, onset, mu_s, tan_theta, g)
         slides = slides & in_contact
         slides_back = slides_back & in_contact & ~(_amplitude(data) > limit)
     return slides, slides_back
 
 
 def _values(data: xr.Dataset, name: str) -> xr.DataArray:
-    """A parameter without its coordinates, which would have to agree with those of others."""
+    """Return a parameter without its coordinates, which would have to agree with others."""
     return data[name].astype(np.float64).reset_coords(drop=True)
 
 
 def _amplitude(data: xr.Dataset) -> Any:
-    """Peak ground acceleration under a waveform, m/s²."""
+    """Return the peak ground acceleration under a waveform, m/s²."""
     if "amplitude" in data.variables:
         return _values(data, "amplitude")
     return peak_acceleration(_values(data, "displacement_amplitude"), _values(data, "frequency"))
 
 
 def _peaks(data: xr.Dataset, motion: Record | Suite | None) -> tuple[Any, Any] | None:
-    """Largest accelerations of the base that drive the block downslope and upslope, m/s²; None: not known."""
+    """Return the largest accelerations of the base downslope and upslope, m/s².
+
+    None: they are not known.
+    """
     if WAVEFORMS.attribute in data.attrs:
         wave = wave_of(WAVEFORMS.from_attributes(data.attrs))
         amplitude = _amplitude(data)
@@ -110,7 +110,7 @@ def _peaks(data: xr.Dataset, motion: Record | Suite | None) -> tuple[Any, Any] |
 
 
 def _recorded_peaks(data: xr.Dataset, motion: Record | Suite) -> tuple[Any, Any]:
-    """Those of a record, or of the motions of a suite one by one."""
+    """Return `_peaks` of a record, or of each motion of a suite."""
     for name in ("motion", "azimuth"):
         if name in data.coords and data[name].ndim:
             (dim,) = data[name].dims
@@ -120,7 +120,9 @@ def _recorded_peaks(data: xr.Dataset, motion: Record | Suite) -> tuple[Any, Any]
     if isinstance(motion, Suite):
         record = motion[str(data["motion"].item())]
         motion = record.rotated(data["azimuth"].item()) if isinstance(record, Pair) else record
-    coords = {str(name): one.reset_coords(drop=True) for name, one in data.coords.items()}
+    coords = {
+        str(name): coordinate.reset_coords(drop=True) for name, coordinate in data.coords.items()
+    }
     factor = strength_factor(motion.times, motion.acceleration, coords) * coords["polarity"]
     ends = [factor * end for end in (motion.acceleration.min(), motion.acceleration.max())]
     return np.maximum(*ends), -np.minimum(*ends)

@@ -22,7 +22,7 @@ from slipsweep.kernels.block import (
     YIELD_GOVERNS,
     Options,
 )
-from slipsweep.kernels.events import root_of
+from slipsweep.kernels.roots import root_of
 from slipsweep.kernels.sine.batch import (
     HALF_PI,
     MOST_E_FOLDINGS,
