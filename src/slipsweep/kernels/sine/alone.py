@@ -4,7 +4,7 @@ In stick-slip these blocks come to Üg = Üy in motion and would stick there, ho
 several times on one rise, have friction that falls in a thin layer, or the literal rise.  In
 continuous sliding D changes its sign several times, or friction falls in a thin layer.
 
-Between neighbouring places (`find_places`) E and D are monotone and D has one sign.  The rise goes
+Between neighbouring places (`find_places`) E is monotone and D has one sign.  The rise goes
 from place to place; the fall and Eq. 12 are those of all pulses (`pulse`).
 docs/numerics.md#cells-solved-alone
 """
@@ -108,7 +108,7 @@ def eq4_gains(batch: Batch, j: int, start: float, end: float, g: float) -> Gains
 def _quantity(
     where: tuple[Batch, int, Quantity, float, float, float], x: float
 ) -> tuple[float, float]:
-    """Return a quantity, less a level, and its slope at |Üg| or ψ; V is counted from ψ = `start`."""
+    """Return a quantity, less a level, and its slope at |Üg| or ψ; V begins at ψ = `start`."""
     batch, j, quantity, level, start, g = where
     if quantity >= Quantity.VELOCITY_HELD:
         ground_acceleration = batch.amplitude[j] * (1.0 - versine(x))
@@ -220,7 +220,7 @@ def rise_alone(batch: Batch, j: int, options: Options) -> None:
                     x_end = batch.places[j, i + 1]
                     switch = rising_phase(root(where, x, x_end, x_end, 0.0), amplitude)
             # b is held; V falls up to Üg = b
-            if velocity > 0.0:
+            if velocity > 0.0 and switch > start:
                 turn = min(max(rising_phase(held, amplitude), start), switch)
                 slowest = velocity + held_gains(amplitude, held, start, turn)[0]
                 least = min(least, slowest)
@@ -236,9 +236,10 @@ def rise_alone(batch: Batch, j: int, options: Options) -> None:
                     x = amplitude * (1.0 - versine(stop))
                     response = x - relative_acceleration(batch, j, x, g)[0]
                     continue
-            gained, moved = held_gains(amplitude, held, start, switch)
-            displacement += velocity * (switch - start) + moved
-            velocity = max(velocity + gained, 0.0)
+            if switch > start:  # over no way the gains are rounding
+                gained, moved = held_gains(amplitude, held, start, switch)
+                displacement += velocity * (switch - start) + moved
+                velocity = max(velocity + gained, 0.0)
             # b follows Eq. 4
             if switch < end:
                 gains = eq4_gains(batch, j, switch, end, g)

@@ -81,7 +81,7 @@ QUANTITIES = (
     "validity",
 )
 
-#: Most places between which E and D are monotone and D has one sign (`alone.find_places`).
+#: Most places between which E is monotone and D has one sign (`alone.find_places`).
 MOST_PLACES = 16
 
 BATCH = np.dtype(

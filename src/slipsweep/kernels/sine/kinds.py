@@ -1,4 +1,4 @@
-"""The kind of a cell's motion under a sine, known before the motion.
+"""The kind of a cell's motion under a sine, which is determined before the motion.
 
 docs/numerics.md#batches-of-the-sine
 """
