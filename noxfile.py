@@ -6,8 +6,8 @@
 
 """The tasks of .ci/run one by one, each in an environment of its own.
 
-`nox --list` shows them, `nox -s lint` runs one.  .ci/run itself does what a newcomer does, in a copy
-of the tree; the tasks are for the work on a change.
+`nox --list` shows them, `nox -s lint` runs one.  .ci/run itself does what a newcomer does, in a
+copy of the tree; the tasks are for the work on a change.
 """
 
 import nox

@@ -1,7 +1,7 @@
 """Times whose history asv keeps: six tasks that users wait for.
 
-Kernels are compiled before a time is taken, but for `FirstUse`.  The tables of `benchmarks/` compare
-with other programs; these compare the program with itself, from commit to commit.
+Kernels are compiled before a time is taken, but for `FirstUse`.  The tables of `benchmarks/`
+compare with other programs; these compare the program with itself, from commit to commit.
 """
 
 import os

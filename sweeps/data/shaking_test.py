@@ -1,4 +1,6 @@
-"""Make shaking_test.csv, a made-up test on a shaking table: run ``python sweeps/data/shaking_test.py``.
+"""Make shaking_test.csv, a made-up test on a shaking table.
+
+Run ``python sweeps/data/shaking_test.py``.
 
 A block on a plane of 5 degrees (static friction 0.38) in stick-slip: what `slipsweep.simulate`
 gives for Üy = 1.8 m/s², λ = 2 and Δμ = 0.1 under eight cycles of 2 Hz and 5 m/s², between rests of

@@ -20,12 +20,13 @@ RISE = 2.0
 STRONG = 8.0
 SEED = 2012
 
-HEADER = """\
-# A synthetic accelerogram, made by synthetic.py beside this file. Nobody recorded it.
-# Kanai-Tajimi spectrum (2.5 Hz, damping 0.6), random phases, 20 s at 100 samples a second, peak 0.35 g.
-# In the public domain (CC0 1.0).
-time (s),acceleration (g)
-"""
+HEADER = (
+    "# A synthetic accelerogram, made by synthetic.py beside this file. Nobody recorded it.\n"
+    "# Kanai-Tajimi spectrum (2.5 Hz, damping 0.6), random phases, "
+    "20 s at 100 samples a second, peak 0.35 g.\n"
+    "# In the public domain (CC0 1.0).\n"
+    "time (s),acceleration (g)\n"
+)
 
 
 def acceleration() -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,6 @@
-"""What charts say in words: captions, titles of a user's own, and results that no chart is drawn of."""
+"""What charts say in words: captions, titles of a user's own, and results that no chart is drawn
+of.
+"""
 
 import io
 import re

@@ -50,7 +50,9 @@ def test_hatching_is_where_validity_says_so(grid: xr.Dataset, x: str) -> None:
 
 
 def test_what_no_block_does_is_marked_and_its_share_told(lined: xr.Dataset) -> None:
-    """Displacements that fall with A, or lie below half of Newmark's: against sweeps of this test's own."""
+    """Displacements that fall with A, or lie below half of Newmark's: against sweeps of this test's
+    own.
+    """
     given: dict[str, Any] = {
         "theta": 14.0,
         "mu_s": 0.25,
@@ -75,7 +77,8 @@ def test_what_no_block_does_is_marked_and_its_share_told(lined: xr.Dataset) -> N
     xs, ys = line.get_data()
     np.testing.assert_array_equal(np.isin(amplitudes, xs[np.isfinite(ys)]), falls | below)
     share = [f"{100 * one.sum() / shown.sum():.2g} %" for one in (falls | below, falls, below)]
-    trends = f"The displacement falls with A in {share[1]} and lies below half of Newmark's in {share[2]}"
+    falls = f"The displacement falls with A in {share[1]}"
+    trends = f"{falls} and lies below half of Newmark's in {share[2]}"
     assert f"{share[0]} of the sliding cells shown. {trends}" in caption(figure)
     ratio = lined.slipsweep.chart("newmark", at={"mu_s": 0.25, "frequency": 1})
     cells = np.stack([np.full_like(amplitudes, 14.0), amplitudes], axis=-1)
@@ -88,7 +91,9 @@ def test_what_no_block_does_is_marked_and_its_share_told(lined: xr.Dataset) -> N
 
 
 def test_a_fall_is_counted_against_an_amplitude_one_percent_smaller() -> None:
-    """Just beyond the jump at the mode limit the displacement falls, and is larger than before the jump."""
+    """Just beyond the jump at the mode limit the displacement falls, and is larger than before the
+    jump.
+    """
     limit = slipsweep.friction_parameters(11.0, 0.25, 1.0).limiting_acceleration.item()
     amplitudes = limit * np.array([0.55, 1.03, 1.06, 1.08])
     block: dict[str, Any] = {"theta": 11.0, "mu_s": 0.25, "frequency": 1.0, "excitation": SINE}
@@ -109,7 +114,9 @@ def test_a_fall_is_counted_against_an_amplitude_one_percent_smaller() -> None:
 
 
 def test_shares_of_what_is_unsound_are_those_of_all_cells() -> None:
-    """Of some 300 000 cells half are counted: to a percent or two what all of them say, on axes long and short."""
+    """Of some 300 000 cells half are counted: to a percent or two what all of them say, on axes
+    long and short.
+    """
     axes = (
         np.linspace(0, 20, 11),
         np.linspace(0.2, 0.9, 8),
@@ -129,7 +136,9 @@ def test_shares_of_what_is_unsound_are_those_of_all_cells() -> None:
 
 
 def test_what_is_not_to_be_read_is_said() -> None:
-    """A coarse grid, estimated friction in continuous sliding; a slice at another friction angle is solved."""
+    """A coarse grid, estimated friction in continuous sliding; a slice at another friction angle is
+    solved.
+    """
     coarse = slipsweep.sweep(5.0, 0.3, [1.0, 3.0, 4.0, 9.0], [1.0, 2.0, 4.0])
     text = caption(coarse.slipsweep.chart("contours"))
     assert "Coarse grid: values grow more than tenfold from cell to cell" in text

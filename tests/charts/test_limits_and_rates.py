@@ -130,7 +130,9 @@ def test_annual_rates_are_drawn_over_millimetres(result: xr.Dataset) -> None:
 
 
 def test_rates_that_come_from_above_the_amplitudes_are_dotted(result: xr.Dataset) -> None:
-    """Where more than half of the rate is held; of many displacements only those marked have markers."""
+    """Where more than half of the rate is held; of many displacements only those marked have
+    markers.
+    """
     block = result.sel(theta=5.0, mu_s=0.3)
     curve = slipsweep.HazardCurve(np.array([0.5, 5.9, 30.0]), np.array([1e-2, 1e-3, 9e-4]))
     lengths = np.geomspace(0.0005, 0.06, 41)

@@ -68,7 +68,9 @@ def test_ratios_have_one_order_of_lightness() -> None:
 
 @pytest.mark.parametrize("kind", SWEEP_KINDS)
 def test_a_narrow_grey_chart_is_legible(lined: xr.Dataset, kind: str) -> None:
-    """Nothing is cut off, no legend lies on the data, no entry is without its mark, and nothing has a colour."""
+    """Nothing is cut off, no legend lies on the data, no entry is without its mark, and nothing has
+    a colour.
+    """
     figure = lined.slipsweep.chart(
         kind, at={"mu_s": 0.25}, width=90 if kind == "modes" else "90mm", grey=True
     )

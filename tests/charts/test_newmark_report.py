@@ -1,4 +1,6 @@
-"""The report of a result of Newmark's block says nothing of the paper, which it does not compute."""
+"""The report of a result of Newmark's block says nothing of the paper, which it
+does not compute.
+"""
 
 from typing import Any
 

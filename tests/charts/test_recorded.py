@@ -185,7 +185,8 @@ def test_charts_that_recorded_motions_do_not_have_are_refused(result: xr.Dataset
     for arguments, message in (
         (
             ("contours",),
-            "--kind contours: is a sweep under a suite of motions: must be one of motions, fragility",
+            "--kind contours: is a sweep under a suite of motions: "
+            "must be one of motions, fragility",
         ),
         (
             ("motions", {"at": {"mu_s": 0.35}}),

@@ -1,4 +1,6 @@
-"""Charts of statistics: probabilities, bands of quantiles and Sobol indices, as they are in the result."""
+"""Charts of statistics: probabilities, bands of quantiles and Sobol indices, as they are in the
+result.
+"""
 
 from typing import Any
 
@@ -89,7 +91,9 @@ def test_bands_lie_between_quantiles_in_millimetres(sampled: xr.Dataset) -> None
 
 
 def test_curves_of_sobol_indices(sampled: xr.Dataset) -> None:
-    """Total indices with markers and their intervals, first-order ones dashed in the same colour."""
+    """Total indices with markers and their intervals, first-order ones dashed in the
+    same colour.
+    """
     figure = sampled.slipsweep.chart("sensitivity", at={"frequency": 2})
     axes = figure.axes[0]
     assert axes.get_ylabel() == "Sobol index of the permanent displacement"

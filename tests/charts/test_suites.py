@@ -1,4 +1,6 @@
-"""Charts of suites of motions: units, legends, Newmark's block beside the paper's, what a regression is of."""
+"""Charts of suites of motions: units, legends, Newmark's block beside the paper's, what a
+regression is of.
+"""
 
 import numpy as np
 import pytest
@@ -13,7 +15,9 @@ G = 9.81
 
 @pytest.fixture(scope="module")
 def both(suite: slipsweep.Suite) -> xr.Dataset:
-    """The paper's block with a decaying interface, and Newmark's, whose displacements are others."""
+    """The paper's block with a decaying interface, and Newmark's, whose
+    displacements are others.
+    """
     return slipsweep.sweep(
         2.0,
         0.3,
@@ -152,7 +156,9 @@ def test_a_regression_says_how_many_motions_it_leaves_out(both: xr.Dataset, show
 
 
 def test_the_caption_counts_zeros_and_shares_of_cautions(result: xr.Dataset) -> None:
-    """Zeros at the grid point that has most of them; a caution's share of all values of the slice."""
+    """Zeros at the grid point that has most of them; a caution's share of all values
+    of the slice.
+    """
     at = {"theta": 5.0, "mu_s": 0.3}
     flagged = result.sel(at).copy(deep=True)
     zeros = (flagged.permanent_displacement == 0.0).sum(["motion", "polarity"])

@@ -41,7 +41,9 @@ def steep() -> xr.Dataset:
 
 
 class Picture:
-    """What a map looks like without the hatches, lines and labels in it: colours of points and pixels."""
+    """What a map looks like without the hatches, lines and labels in it: colours of points and
+    pixels.
+    """
 
     def __init__(self, figure: Figure, names: Sequence[str]) -> None:
         self.axes = figure.axes[0]

@@ -174,7 +174,9 @@ WAYS: dict[str, tuple[Callable[..., xr.Dataset], int]] = {
 
 @pytest.mark.parametrize("way", WAYS)
 def test_served_or_refused_by_name(way: str) -> None:
-    """Draws of which half the numbers are extreme; most are served, and no refusal is a surprise."""
+    """Draws of which half the numbers are extreme; most are served, and no refusal
+    is a surprise.
+    """
     solve, count = WAYS[way]
     served = 0
     for seed in range(count):
@@ -219,7 +221,8 @@ def test_served_or_refused_by_name(way: str) -> None:
         ),
         (
             {"amplitude": [0.0, 2.0], "variables": ["permanent_displacement", "decay_rate"]},
-            "amplitude = 0: has no finite decay_rate (Eqs. 6, 11); must be > 0, or decay_rate be given",
+            "amplitude = 0: has no finite decay_rate (Eqs. 6, 11); "
+            "must be > 0, or decay_rate be given",
         ),
     ],
 )

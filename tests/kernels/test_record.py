@@ -314,7 +314,9 @@ def test_mendez_on_made_up_records(seed: int) -> None:
 def test_finely_sampled_sine(
     options: dict[str, Any], cell: tuple[float, float, float, float]
 ) -> None:
-    """Straight lines lie under a sine by up to h²/8: the response to them differs in second order."""
+    """Straight lines lie under a sine by up to h²/8: the response to them differs in
+    second order.
+    """
     theta, mu_s, amplitude, frequency = cell
     sine = slipsweep.sweep(theta, mu_s, amplitude, frequency, **choices(cycles=3, **options))
     records = [sine_record(amplitude, frequency, 3, samples) for samples in (250, 4000)]
@@ -494,7 +496,8 @@ def test_the_block_slides_once_the_peak_passes_the_yield_acceleration(shaking: R
         ({"amplitude": -1.0}, "amplitude = -1: must be a finite number >= 0"),
         (
             {"frequency": 1.0},
-            "frequency: not allowed with a Record, which takes amplitude, scale, pgv, arias_intensity",
+            "frequency: not allowed with a Record, "
+            "which takes amplitude, scale, pgv, arias_intensity",
         ),
         ({"displacement_amplitude": 1.0}, "displacement_amplitude: not allowed with a Record"),
         ({"structure_frequency": 1.0}, "structure_frequency: not allowed with a Record"),
@@ -585,7 +588,9 @@ def test_dimensions(shaking: Record) -> None:
 
 @pytest.mark.parametrize("sliding", ["downslope", "both"])
 def test_newmark_at_a_sample_that_is_the_yield_acceleration(sliding: Any) -> None:
-    """Üy is a sample, or differs from it in the last bits: the block slides on as if it were not."""
+    """Üy is a sample, or differs from it in the last bits: the block slides on as if
+    it were not.
+    """
     rng = np.random.default_rng(3)
     samples = np.concatenate([[0.0], rng.normal(size=150), [0.0]])
     record = slipsweep.Record.sampled(samples, 0.02)

@@ -1,4 +1,6 @@
-"""Cells under a sine that are solved one by one: blocks in motion at Üg = Üy, thin layers of friction."""
+"""Cells under a sine that are solved one by one: blocks in motion at Üg = Üy, thin layers of
+friction.
+"""
 
 from typing import Any
 

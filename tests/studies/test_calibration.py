@@ -1,4 +1,6 @@
-"""Calibration of synthetic tests: the parameters that went in, coverage of intervals, branches, sensors at fault."""
+"""Calibration of synthetic tests: the parameters that went in, coverage of intervals, branches,
+sensors at fault.
+"""
 
 import re
 from pathlib import Path
@@ -122,7 +124,9 @@ def test_two_branches_are_united_and_a_second_test_tells_them_apart() -> None:
 
 
 def test_a_branch_is_compared_with_its_own_least() -> None:
-    """A second branch, better by less than what refutes it, must not cut the interval of the first."""
+    """A second branch, better by less than what refutes it, must not cut the
+    interval of the first.
+    """
 
     def residuals(point: np.ndarray) -> np.ndarray:
         if point[0] < 0.5:  # one parameter, least 4 at 0.4

@@ -1,4 +1,6 @@
-"""The displacement hazard: closed forms, what lies outside of the amplitudes, curves that are refused, the command."""
+"""The displacement hazard: closed forms, what lies outside of the amplitudes, curves that are
+refused, the command.
+"""
 
 import math
 from pathlib import Path
@@ -71,7 +73,9 @@ def test_the_closed_form_of_a_power_law_and_a_lognormal_fragility(
 
 
 def test_a_step_of_the_fragility_gives_the_rate_of_the_curve() -> None:
-    """A fragility of 0 and then 1 gives the rate of what it jumps at, wherever points of the curve lie."""
+    """A fragility of 0 and then 1 gives the rate of what it jumps at, wherever points of the curve
+    lie.
+    """
     curve = curve_of([1.0, 2.0, 8.0], [0.1, 0.01, 0.001])
     found = exceedance_rates(curve, [1.0, 4.0 * (1 - 1e-12), 4.0, 8.0], [0.0, 0.0, 1.0, 1.0])
     # straight in logarithms: 4² = 2 · 8
@@ -122,7 +126,9 @@ def test_lower_and_upper_rate_are_those_of_the_lower_and_higher_probability() ->
 
 
 def test_rates_of_a_suite_are_those_by_hand() -> None:
-    """Shares of motions; amplitudes in any order and 0; amplitudes, and grid points, without a value."""
+    """Shares of motions; amplitudes in any order and 0; amplitudes, and grid points, without a
+    value.
+    """
     nan = np.nan
     unstable = int(Validity.STATICALLY_UNSTABLE)
     u = np.array(
@@ -164,7 +170,9 @@ def test_rates_of_a_suite_are_those_by_hand() -> None:
 
 
 def test_rates_under_uncertain_friction_pool_samples_and_motions() -> None:
-    """Pooled by `sample` or not, motions weigh the same; the rate is that of the fragility of all samples."""
+    """Pooled by `sample` or not, motions weigh the same; the rate is that of the fragility of all
+    samples.
+    """
     curve = power_law(1e-3, 2.0)
     times = np.arange(0.0, 4.0, 0.01)
     motions = [
@@ -387,7 +395,9 @@ def test_curves_that_are_refused(tmp_path: Path, text: str, message: str) -> Non
 
 
 def test_hazard_prints_rates_and_what_is_not_known_of_them(tmp_path: Path) -> None:
-    """It prints the rates that the function gives, draws them, and says what to do about what is not known."""
+    """It prints the rates that the function gives, draws them, and says what to do about what is
+    not known.
+    """
     rng = np.random.default_rng(3)
     amplitude = np.geomspace(0.5, 10.0, 6)
     u = amplitude[:, None] ** 2 * 0.01 * rng.lognormal(0.0, 0.6, (2, 1, 9)) * [[[1.0]], [[0.5]]]

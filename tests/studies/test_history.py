@@ -1,4 +1,6 @@
-"""Time histories: what they have in common with a sweep, a waveform and mechanics; slides that last long."""
+"""Time histories: what they have in common with a sweep, a waveform and mechanics; slides that last
+long.
+"""
 
 import os
 import subprocess
@@ -65,7 +67,9 @@ def test_a_long_slide_has_a_bounded_number_of_points(
 
 
 def test_a_finely_sampled_sine_in_continuous_sliding() -> None:
-    """A record ends with the plane at rest: what velocity is left when the sine ends is braked by Eq. 12."""
+    """A record ends with the plane at rest: what velocity is left when the sine ends is braked by
+    Eq. 12.
+    """
     block: dict[str, Any] = {"theta": 6.0, "mu_s": 0.38, "yield_acceleration": 0.08}
     sine = simulate(**block, amplitude=6.5, frequency=2.0, excitation=Sine(cycles=3), times=[1.5])
     assert sine.sliding_mode == 2
@@ -106,7 +110,9 @@ def test_a_finely_sampled_sine_in_continuous_sliding() -> None:
 def test_cycles_behind_a_ramp_repeat_from_what_it_leaves(
     excitation: Sine | slipsweep.Cosine, solver: Any
 ) -> None:
-    """A block that does not recouple comes out of the first cycles in motion: its pulses repeat from that velocity."""
+    """A block that does not recouple comes out of the first cycles in motion: its pulses repeat
+    from that velocity.
+    """
     cell: dict[str, Any] = {
         "theta": 0,
         "mu_s": 0.4,
@@ -258,7 +264,9 @@ def test_a_triangle_given_by_its_corners_moves_as_the_waveform() -> None:
 
 
 def test_time_and_sign_only_scale(shaking: Record) -> None:
-    """v ∝ time_scale, u ∝ time_scale²; a record turned and taken with the other sign is the same motion."""
+    """v ∝ time_scale, u ∝ time_scale²; a record turned and taken with the other sign is the same
+    motion.
+    """
     given: dict[str, Any] = {"theta": 4.0, "mu_s": 0.4, "scale": 1.7}
     one = simulate(excitation=shaking, **given)
     slow = simulate(excitation=shaking, **given, time_scale=2.5)

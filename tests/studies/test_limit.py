@@ -1,4 +1,6 @@
-"""The inverse of the sweep: limit amplitudes against the sweep itself, closed forms, dense scans and scaling laws."""
+"""The inverse of the sweep: limit amplitudes against the sweep itself, closed forms, dense scans
+and scaling laws.
+"""
 
 import math
 from pathlib import Path
@@ -115,7 +117,9 @@ def test_a_target_within_the_jump_is_reached_at_the_mode_limit() -> None:
 
 
 def test_a_target_beyond_a_gap_without_values_is_reached_after_it() -> None:
-    """With mu_s > 1 the calibrated decay rate is not positive below the mode limit, from xi = mu_s^-1/2 on."""
+    """With mu_s > 1 the calibrated decay rate is not positive below the mode limit, from xi =
+    mu_s^-1/2 on.
+    """
     given: dict[str, Any] = {"theta": 10, "mu_s": 1.2, "frequency": 1.0, "yield_acceleration": 4.0}
     limit = slipsweep.friction_parameters(
         10, 1.2, 1.0, yield_acceleration=4.0
@@ -136,7 +140,9 @@ def test_a_target_beyond_a_gap_without_values_is_reached_after_it() -> None:
 
 
 def test_smallest_amplitude_of_a_dense_scan() -> None:
-    """Brute force: the first of 200 000 amplitudes of `sweep` that reaches the target lies just above the limit."""
+    """Brute force: the first of 200 000 amplitudes of `sweep` that reaches the target lies just
+    above the limit.
+    """
     amplitudes = np.linspace(0.3, 20, 200_001)
     step = amplitudes[1] - amplitudes[0]
     cases: list[tuple[float, float, dict[str, Any]]] = [
@@ -157,7 +163,9 @@ def test_smallest_amplitude_of_a_dense_scan() -> None:
 
 
 def test_beside_a_gap_every_displacement_is_reached() -> None:
-    """With the literal rise Kd comes to 0 at the gap's edge, and the run-out v²/(2 g Kd) beyond all bounds."""
+    """With the literal rise Kd comes to 0 at the gap's edge, and the run-out v²/(2 g Kd) beyond all
+    bounds.
+    """
     given: dict[str, Any] = {
         "theta": 0,
         "mu_s": [0.3, 0.4, 0.6],
@@ -178,7 +186,9 @@ def test_beside_a_gap_every_displacement_is_reached() -> None:
 
 
 def test_narrow_peaks_of_blocks_that_do_not_recouple_are_found() -> None:
-    """The limit is never above the first of 20 000 amplitudes that reaches the target: u(A) is a saw, or has a kink."""
+    """The limit is never above the first of 20 000 amplitudes that reaches the target: u(A) is a
+    saw, or has a kink.
+    """
     names = ("theta", "mu_s", "yield_acceleration", "displacement")
     rows = [
         (2.3172513553765843, 0.1577915701729295, 0.0515279329701465, 1.9511674594282442),
@@ -301,7 +311,9 @@ def case_of(seed: int) -> dict[str, Any]:
 
 
 def test_limits_are_exact_and_the_first(shaking: Record) -> None:
-    """The displacement is reached there, not at the number before, nor at any of a dense scan below."""
+    """The displacement is reached there, not at the number before, nor at any of a dense scan
+    below.
+    """
     seen = set()
     for seed in range(24):
         given = case_of(seed)
@@ -341,7 +353,9 @@ def test_limits_are_exact_and_the_first(shaking: Record) -> None:
 
 
 def test_time_and_sign_only_scale(shaking: Record) -> None:
-    """u ∝ time_scale²: a displacement at twice the time is four of them; a record turned is the other sign."""
+    """u ∝ time_scale²: a displacement at twice the time is four of them; a record turned is the
+    other sign.
+    """
     block: dict[str, Any] = {"theta": [0.0, 8.0], "mu_s": [0.35, 0.6]}
     wanted = np.array([0.002, 0.05])
     one = limit_amplitude(wanted, **block, excitation=shaking, polarity="both")

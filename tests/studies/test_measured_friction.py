@@ -1,4 +1,6 @@
-"""Eq. 1 and statics on synthetic tests: the friction that went in, the slides, sensors at fault, files."""
+"""Eq. 1 and statics on synthetic tests: the friction that went in, the slides, sensors at fault,
+files.
+"""
 
 import math
 from pathlib import Path
@@ -101,7 +103,9 @@ def test_a_decaying_interface_is_not_called_constant(stick_slip: xr.Dataset) -> 
 
 @pytest.mark.parametrize("noise", [0.0, 0.02])
 def test_stick_slip_has_one_slide_a_cycle(stick_slip: xr.Dataset, noise: float) -> None:
-    """A slide a cycle: onset where Eq. 4 first falls behind the table, peak with it, stop as simulated."""
+    """A slide a cycle: onset where Eq. 4 first falls behind the table, peak with it, stop as
+    simulated.
+    """
     found = friction(measured(stick_slip, noise=noise))
     assert found.sizes["slide"] == 5
     moving = stick_slip.relative_velocity.values > 1e-9

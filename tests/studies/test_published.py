@@ -77,7 +77,9 @@ def test_medians_are_those_of_other_programs(
 
 
 def test_a_textbook_example_of_jibson_with_the_magnitude() -> None:
-    """Kramer and Stewart, example 10.4: ky 0.067, 0.1 g, M 6.7: 0.18 cm, with one deviation 0.52."""
+    """Kramer and Stewart, example 10.4: ky 0.067, 0.1 g, M 6.7: 0.18 cm, with one
+    deviation 0.52.
+    """
     estimate = published.jibson_2007_magnitude(0.067, 0.1, 6.7)
     above = estimate.median * np.exp(estimate.log_standard_deviation)
     assert (round(100 * estimate.median, 2), round(100 * above, 2)) == (0.18, 0.52)

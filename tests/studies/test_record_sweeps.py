@@ -1,4 +1,6 @@
-"""Recorded motions in sweep files: what a run writes, that it repeats itself, chunks, and what is refused."""
+"""Recorded motions in sweep files: what a run writes, that it repeats itself, chunks, and what is
+refused.
+"""
 
 import hashlib
 from pathlib import Path

@@ -1,4 +1,6 @@
-"""Sobol indices: closed forms, scipy, what physics leaves no doubt about; what has none; files and commands."""
+"""Sobol indices: closed forms, scipy, what physics leaves no doubt about; what has none; files and
+commands.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -51,7 +53,9 @@ def test_ishigamis_function(seed: int) -> None:
 
 
 def test_estimates_are_those_of_scipy() -> None:
-    """The estimators of scipy.stats.sobol_indices, and its bootstrap's percentiles but for what chance does to them."""
+    """The estimators of scipy.stats.sobol_indices, and its bootstrap's percentiles but for what
+    chance does to them.
+    """
     sampling = sampling_of(ANGLES, sensitivity=True, samples=512)
     runs = ishigami(sampling.draws).reshape(5, 1, 512)
     found = reduced(sampling, runs.ravel())
@@ -92,7 +96,9 @@ def test_intervals_of_random_numbers_hold_the_truth_as_often_as_they_say() -> No
 
 
 def test_a_product_of_two_inputs() -> None:
-    """u = W(A)/ω²: with A and f drawn the variance of a product, whose indices have a closed form."""
+    """u = W(A)/ω²: with A and f drawn the variance of a product, whose indices have
+    a closed form.
+    """
     block: dict[str, Any] = {"theta": 5.0, "mu_s": 0.4}
     strength = stats.uniform(3.0, 5.0)
     pace = stats.lognorm(0.1, scale=2.0)

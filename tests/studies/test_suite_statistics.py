@@ -86,7 +86,9 @@ def test_zeros_missing_values_and_rounding_in_statistics_by_hand() -> None:
 
 @pytest.mark.parametrize("over", [None, "motion", ["motion", "polarity", "theta"]])
 def test_statistics_are_numpys_of_each_grid_point(over: Any) -> None:
-    """Random displacements, a third zero and a fifth missing; polarity is part of the suite unless told otherwise."""
+    """Random displacements, a third zero and a fifth missing; polarity is part of the suite unless
+    told otherwise.
+    """
     rng = np.random.default_rng(11)
     dims = ("theta", "polarity", "mu_s", "motion")
     values = np.where(rng.random((3, 2, 4, 20)) < 0.3, 0.0, rng.lognormal(-3.0, 1.2, (3, 2, 4, 20)))
@@ -169,7 +171,9 @@ def test_statistics_of_no_suite_are_refused(given: dict[str, Any], message: str)
 
 
 def test_limits_of_motions_without_a_value_are_left_out_of_their_quantiles() -> None:
-    """Those that are not reached are above all others; without a value at any amplitude there is no limit."""
+    """Those that are not reached are above all others; without a value at any amplitude there is no
+    limit.
+    """
     nan = np.nan
     reached, beyond, invalid = LimitStatus.REACHED, LimitStatus.NOT_REACHED, LimitStatus.INVALID
     values = [[1.0, 2.0, 3.0, nan, nan], [1.0, nan, nan, nan, nan], [nan, nan, nan, nan, nan]]

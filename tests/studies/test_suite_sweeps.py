@@ -1,4 +1,6 @@
-"""Suites in sweep files: what a run writes, chunks, kills, workers, that it repeats itself, and what is refused."""
+"""Suites in sweep files: what a run writes, chunks, kills, workers, that it repeats itself, and
+what is refused.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -47,7 +49,9 @@ mu_s = { distribution = "uniform", loc = 0.1, scale = 0.2 }
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A sweep file and three motions of different lengths and intervals; the folder's name looks like a pattern."""
+    """A sweep file and three motions of different lengths and intervals; the folder's name looks
+    like a pattern.
+    """
     folder = tmp_path / "site [a]*"
     (folder / "motions").mkdir(parents=True)
     for seed, (count, interval) in enumerate([(150, 0.01), (80, 0.02), (200, 0.005)]):

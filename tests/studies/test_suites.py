@@ -1,4 +1,6 @@
-"""Suites of recorded motions: each motion as alone, strengths, azimuths, limits, samples, and what is refused."""
+"""Suites of recorded motions: each motion as alone, strengths, azimuths, limits, samples, and what
+is refused.
+"""
 
 import pickle
 from typing import Any

@@ -1,4 +1,6 @@
-"""Uncertain inputs: statistics against closed forms, plain sweeps and scipy; files, commands and charts."""
+"""Uncertain inputs: statistics against closed forms, plain sweeps and scipy; files, commands and
+charts.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -214,7 +216,9 @@ def test_samples_of_a_displacement_amplitude_depend_on_the_frequency() -> None:
 
 
 def test_samples_obey_the_scaling_law() -> None:
-    """u = W/ω²: twice the frequency, a quarter of every quantile, and P(u > d/4) what P(u > d) was."""
+    """u = W/ω²: twice the frequency, a quarter of every quantile, and P(u > d/4)
+    what P(u > d) was.
+    """
     options: dict[str, Any] = {"uncertain": {"amplitude": FACTOR}, "samples": 512}
     one = slipsweep.sample(**{**GRID, "frequency": 1.0}, **options, thresholds=[0.04, 0.4])
     two = slipsweep.sample(**{**GRID, "frequency": 2.0}, **options, thresholds=[0.01, 0.1])
@@ -229,7 +233,9 @@ def test_samples_obey_the_scaling_law() -> None:
     "name", ["yield_acceleration", "minimum_friction", "delta_mu", "decay_rate"]
 )
 def test_a_factor_multiplies_the_estimate_of_a_parameter(name: str) -> None:
-    """Where the parameter is not given, its estimate (Coulomb's, Eqs. 9-11, Eq. 6) at each draw is what scatters."""
+    """Where the parameter is not given, its estimate (Coulomb's, Eqs. 9-11, Eq. 6) at each draw is
+    what scatters.
+    """
     uncertain: dict[str, Any] = {
         name: {"distribution": "uniform", "loc": 0.9, "scale": 0.2, "kind": "factor"},
         "mu_s": {"distribution": "uniform", "loc": 0.35, "scale": 0.1},
@@ -260,7 +266,9 @@ def test_a_factor_multiplies_the_estimate_of_a_parameter(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["decay_rate", "delta_mu", "minimum_friction"])
 def test_a_factor_on_an_estimate_that_fails_has_no_value(name: str) -> None:
-    """λ by Eq. 6 is negative: the block has a flag and no displacement, not 0, whatever is drawn about it."""
+    """λ by Eq. 6 is negative: the block has a flag and no displacement, not 0, whatever is drawn
+    about it.
+    """
     block: dict[str, Any] = {"theta": 0.0, "mu_s": 1.5, "amplitude": 14.0}
     block["yield_acceleration"] = 1.0
     estimate = slipsweep.friction_parameters(**block)
@@ -297,7 +305,9 @@ def test_correlation_of_normal_scores() -> None:
 
 
 def test_samples_that_lose_contact_are_no_part_of_a_probability() -> None:
-    """Unlike statically unstable ones: P(u > d) = (above + unstable) / (with a value + unstable)."""
+    """Unlike statically unstable ones: P(u > d) = (above + unstable) / (with a value
+    + unstable).
+    """
     uncertain = {
         "mu_s": {"distribution": "uniform", "loc": 0.3, "scale": 0.4},
         "amplitude": {"distribution": "uniform", "loc": 2.0, "scale": 24.0},

@@ -1,4 +1,6 @@
-"""Newmark's block given by its yield coefficient alone: as by Üy, wherever a block is given, and refused elsewhere."""
+"""Newmark's block given by its yield coefficient alone: as by Üy, wherever a block is given, and
+refused elsewhere.
+"""
 
 from pathlib import Path
 from typing import Any

@@ -224,7 +224,8 @@ def command(task: str, *examples: str) -> Callable[[Callable[..., None]], Callab
             _options(choices[name], parameter.default) if name in choices else [parameter]
             for name, parameter in parameters.items()
         )
-        run.__signature__ = inspect.Signature([*itertools.chain(*expanded)])  # type: ignore[attr-defined]
+        signature = inspect.Signature([*itertools.chain(*expanded)])
+        run.__signature__ = signature  # type: ignore[attr-defined]
         app.command(rich_help_panel=task, epilog="\n\n".join(("Examples:", *examples)))(run)
         return function
 

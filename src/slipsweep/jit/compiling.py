@@ -5,8 +5,8 @@
 * A kernel is kept in a folder whose name is a digest of all sources that kernels are made of: a
   changed equation is never served from an old one.
 * The digests of a kernel's files are written when they are complete, and compared before numba
-  loads them.  Files that a power cut left empty or short, which may crash LLVM, are removed, and the
-  kernel is compiled anew.
+  loads them.  Files that a power cut left empty or short, which may crash LLVM, are removed, and
+  the kernel is compiled anew.
 * Machine code is loaded from a folder of this user only, in which nobody else may write.  Where
   there is none, kernels are compiled in memory, with a warning.
 * Where the folder has no locks, several processes may compile the same kernel.  numba gives each

@@ -195,7 +195,7 @@ class LagIntegrals(NamedTuple):
 
 @scalar
 def straight_lag_integrals(block: Block, x: float, change: float, width: float) -> LagIntegrals:
-    """Return `LagIntegrals` where |Üg| goes from x along a straight line, by `change`: closed forms.
+    """Return `LagIntegrals` in closed form where |Üg| changes by `change` along a straight line.
 
     docs/numerics.md#straight-pieces
     """
@@ -261,7 +261,9 @@ def panel_lag_integrals(
 def lag_integrals(
     block: Block, piece: Piece, curve: Curve, start: float, end: float, slide: Slide
 ) -> LagIntegrals:
-    """Return `LagIntegrals` over a part of a piece; of a curve panel by panel from the larger friction on.
+    """Return `LagIntegrals` over a part of a piece.
+
+    A curve is integrated panel by panel from the larger friction on.
 
     docs/numerics.md#curved-pieces
     """

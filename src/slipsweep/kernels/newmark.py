@@ -190,7 +190,9 @@ def stop_on_curve(
     rate: float,
     wants_peak: bool,
 ) -> tuple[float, float]:
-    """Return where the block stops on a curved piece (infinity: not), and its largest speed on it."""
+    """Return where the block stops on a curved piece (infinity: not), and its
+    largest speed on it.
+    """
     finish = piece.finish
     last_rate = excess + scale * (piece.last - piece.top)
     largest = speed
@@ -410,7 +412,9 @@ def begin(block: Block, cell: Cell, g: float) -> bool:
 
 @scalar
 def store(block: Block, pulses: float, result: np.ndarray) -> None:
-    """Let the block run out after the shaking, and write what has become of it (`block.RESULTS`,)."""
+    """Let the block run out after the shaking, and write what has become of it
+    (`block.RESULTS`,).
+    """
     side = math.copysign(1.0, block.velocity)
     limit = block.yield_acceleration if side > 0.0 else block.upslope_yield_acceleration
     block.displacement += side * block.velocity * block.velocity / (2.0 * limit)

@@ -29,7 +29,9 @@ def root_of(value_and_slope: Callable[[Any, float], tuple[float, float]]) -> Cal
 
     @scalar
     def root(where: Any, below: float, above: float, x: float, origin: float) -> float:
-        """Return where f passes 0 between `below`, where it is negative, and `above`, from x on; NaN if not found.
+        """Return where f passes 0 between `below`, where it is negative, and `above`.
+
+        The search begins at x; NaN says that it has found nothing.
 
         `where` is what f is a function of besides x, and `origin` what x is counted from: the
         root is within 1e-9 of its distance from there.

@@ -72,8 +72,8 @@ class Law(NamedTuple):
     """A friction law μ(block, Üg, v, s), and the block that it acts on.
 
     v is the relative velocity in m/s, s = ∫|v|dt the slip in m.  `knows_motion` says whether μ
-    depends on v or s, `knows_slip` whether on s.  `longest_step`, of the block and the rate of V, is
-    the longest step that resolves the law (`unlimited`, if the default steps do).  The rest says
+    depends on v or s, `knows_slip` whether on s.  `longest_step`, of the block and the rate of V,
+    is the longest step that resolves the law (`unlimited`, if the default steps do).  The rest says
     what the block does: its rate while it slides, how it waits, and how it comes to rest after the
     shaking.  `step_cells.paper_law` makes the law of a block of the paper.
     """

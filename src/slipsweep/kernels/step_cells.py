@@ -120,8 +120,8 @@ def repetitions(law: Law, block: Block, left: int) -> int:
     """Return how often the next cycles of that shape, at most `left`, gain what the last one did.
 
     They do so if they begin in the same state; and also with a larger V, if friction does not
-    depend on the motion and the block does not come to rest: then V is larger throughout by as much.  A
-    block that weakens with the slip is never in the same state.
+    depend on the motion and the block does not come to rest: then V is larger throughout by as
+    much.  A block that weakens with the slip is never in the same state.
     """
     weakens = block.cycle_slip < block.weakens_until
     if block.phase != block.cycle_phase or block.held != block.cycle_held or weakens:

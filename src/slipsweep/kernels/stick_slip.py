@@ -72,7 +72,9 @@ def rising_acceleration(block: Block, held: float, x: float) -> float:
 
 @scalar
 def inside(x: float, end: float) -> float:
-    """Return a place just beyond x on the way to `end`; at x, perhaps a root, signs are rounding."""
+    """Return a place just beyond x on the way to `end`; at x, perhaps a root, signs
+    are rounding.
+    """
     way = end - x
     return x + math.copysign(min(max(_SLIVER * abs(way), _ROUNDING * abs(x)), abs(way)), way)
 
@@ -417,7 +419,9 @@ def first_pulse(block: Block, path: Path, k: int) -> int:
 
 @scalar
 def beginning(block: Block, path: Path, k: int) -> Place:
-    """Return the place in interval k at which Üg comes to Üy; past the last it is past all pieces."""
+    """Return the place in interval k at which Üg comes to Üy; past the last it is
+    past all pieces.
+    """
     if k >= path.intervals.size:
         return Place(path.base.pieces.size, 0.0)
     interval = path.intervals[k]

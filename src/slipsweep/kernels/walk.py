@@ -389,7 +389,9 @@ def validity_before(
 
 @scalar
 def motion_of(cell: Cell, path: Path, mode: int, walk: Walk) -> Motion:
-    """Return the results of a walk; a record has no mode, but counts of pulses, a wave no counts."""
+    """Return the results of a walk; a record has no mode, but counts of pulses, a
+    wave no counts.
+    """
     largest = cell.amplitude
     if path.recorded:
         largest *= max(path.highest, -path.lowest)

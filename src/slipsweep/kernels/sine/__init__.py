@@ -1,4 +1,4 @@
-"""The exact kernel for a sine: cells whose motion is of the same kind are computed together, in SIMD.
+"""The exact kernel for a sine: cells of one kind of motion are computed together, in SIMD.
 
 `solve` puts cells into batches (`batch`) by the kind of their motion (`kinds`), and solves one when
 it is full: pulses of stick-slip and of Newmark's block (`pulse`), continuous sliding

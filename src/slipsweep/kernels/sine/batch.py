@@ -117,7 +117,8 @@ NODES, WEIGHTS = (
 )
 MOST_E_FOLDINGS = 6.0
 
-#: Newton's iteration has converged when its last step is smaller than this part of the value: 1e-14 is left.
+#: Newton's iteration has converged when its last step is smaller than this part of the value:
+#: an error of 1e-14 is left.
 TOLERANCE = 1e-7
 MOST_STEPS = 32
 
@@ -223,7 +224,9 @@ def integrate_eq4(batch: Batch, side: float, g: float) -> None:
 
 @scalar
 def find_eq4_event(batch: Batch, holds: float, side: float, g: float) -> None:
-    """Set `event` to the |Üg| at which D = 0 on a side of Üg = 0; or E = b, `level`, if `holds` is 1.
+    """Set `event` to the |Üg| at which D = 0 on a side of Üg = 0.
+
+    If `holds` is 1 it is that at which E = b, `level`.
 
     Newton's iteration of all cells that have not `converged`, from `event` on.  It needs no
     bracket: each begins on the side from which it cannot pass the root

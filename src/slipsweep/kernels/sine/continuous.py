@@ -1,7 +1,7 @@
 """Continuous sliding under a sine: Eq. 4 throughout, from integrals over one quarter of the cycle.
 
-|Üg| and the friction repeat every quarter, mirrored, so that a quarter gives a cycle, and the cycles
-an arithmetic series.  docs/numerics.md#continuous-sliding
+|Üg| and the friction repeat every quarter, mirrored, so that a quarter gives a cycle, and the
+cycles an arithmetic series.  docs/numerics.md#continuous-sliding
 """
 
 import math

@@ -62,7 +62,7 @@ def pulse_kind(batch: Batch, j: int, g: float) -> int:
 
 @inlined
 def stays_with_base(batch: Batch, j: int, g: float) -> bool:
-    """Return True if Eq. 4 keeps a block with the base up to the peak: D is nowhere above 0 from Üy on.
+    """Return True if Eq. 4 keeps a block with the base up to the peak: D ≤ 0 from Üy on.
 
     D is convex, then concave: nowhere larger than at Üy or than its tangent at the peak.
     """
