@@ -107,7 +107,8 @@ def solve_sine(cells: np.ndarray, options: Options, alone: bool, results: np.nda
     `results` is (fields of `Motion`, cells).  Where the validity is then `UNSOLVED` a cell is of no
     kind that is solved in SIMD, and has to be solved `alone`.
     """
-    batches = np.empty(kinds.KINDS + 1, BATCH)
+    # zeros: a NaN in a lane that a kind does not set would keep its iterations from ending
+    batches = np.zeros(kinds.KINDS + 1, BATCH)
     for kind in range(kinds.KINDS):
         batches[kind].used = 0
     loaded = batches[kinds.KINDS]
