@@ -255,6 +255,7 @@ class Step(NamedTuple):
 def advance(
     law: Law,
     block: Block,
+    velocity: float,
     start: float,
     middle: float,
     end: float,
@@ -267,7 +268,6 @@ def advance(
     """
     if law.knows_motion:
         return advance_by_stages(law, block, start, middle, end, h, first_rate)
-    velocity = block.velocity
     last_rate = rate(law, block, end, velocity, block.slip)
     middle_rate = 0.5 * (first_rate + last_rate)
     gained = first_rate
@@ -801,16 +801,29 @@ def begin_pulse(law: Law, block: Block, piece: Piece, tau: float, peak: float) -
 def slide_on(law: Law, block: Block, points: np.ndarray, h: float, first_rate: float) -> None:
     """Continuous sliding, which does not end, in equal steps to the end of the piece."""
     each = 2 if block.rule == SIMPSON else 1
+    velocity = block.velocity
+    displacement = block.displacement
+    largest = velocity
+    least = velocity
     start = block.amplitude * points[0]
     for k in range(each, points.size, each):
         end = block.amplitude * points[k]
         middle = block.amplitude * points[k - 1] if each == 2 else 0.5 * (start + end)
-        step = advance(law, block, start, middle, end, h, first_rate)
+        step = advance(law, block, velocity, start, middle, end, h, first_rate)
         if turns(step):
-            note_extreme(block, step)
-        take(block, step)
+            extreme = velocity_in_step(velocity, step, part_to_turn(step))
+            largest = max(largest, extreme)
+            least = min(least, extreme)
+        velocity += step.gained
+        displacement += step.moved
+        largest = max(largest, velocity)
+        least = min(least, velocity)
         first_rate = step.last_rate
         start = end
+    block.velocity = velocity
+    block.displacement = displacement
+    block.largest_velocity = max(block.largest_velocity, largest)
+    block.least_velocity = min(block.least_velocity, least)
 
 
 @scalar
@@ -882,7 +895,7 @@ def step_along(
             h = min(max(longest, SHORTEST_STEP), end - tau)
             after = end if h >= end - tau else tau + h
             middle, last = ground_in_step(block, piece, curves, ground, tau, h)
-        step = advance(law, block, ground, middle, last, h, first_rate)
+        step = advance(law, block, block.velocity, ground, middle, last, h, first_rate)
         ending = GOES_ON
         if may_end(law, block, step):
             part, ending = end_of_phase(law, block, step)
@@ -894,7 +907,7 @@ def step_along(
                 h *= part
                 after = tau + h
                 middle, last = ground_in_step(block, piece, curves, ground, tau, h)
-                step = advance(law, block, ground, middle, last, h, first_rate)
+                step = advance(law, block, block.velocity, ground, middle, last, h, first_rate)
             if turns(step):
                 note_extreme(block, step)
         if log.size > 0:
