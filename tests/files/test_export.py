@@ -13,8 +13,7 @@ import xarray as xr
 
 import slipsweep
 from slipsweep.errors import InputError
-from slipsweep.files import export, spec
-from slipsweep.files import running as store
+from slipsweep.files import export, running, spec
 from slipsweep.files.jobs import sweep_job
 from slipsweep.model.variables import Validity
 from tests.support.commands import command
@@ -45,7 +44,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a grid and a list of cases, solved."""
     folder = tmp_path_factory.mktemp("export")
     for name, text in (("grid", GRID), ("cases", CASES)):
-        store.run(sweep_job(spec.parse(text, name)), folder / f"{name}.nc", command="x")
+        running.run(sweep_job(spec.parse(text, name)), folder / f"{name}.nc", command="x")
     return folder
 
 
@@ -108,7 +107,7 @@ def test_a_dimension_that_no_variable_has_is_left_out(tmp_path: Path) -> None:
     text = GRID.replace("displacement_amplitude", "amplitude").replace(
         "decay_rate", "structure_frequency"
     )
-    store.run(sweep_job(spec.parse(text, "x")), tmp_path / "a.nc", command="x")
+    running.run(sweep_job(spec.parse(text, "x")), tmp_path / "a.nc", command="x")
     assert (
         export.export(tmp_path / "a.nc", tmp_path / "a.csv", variables=["limiting_acceleration"])
         == 18
@@ -148,7 +147,7 @@ def test_several_flags_of_a_cell_are_spelled_one_after_the_other(tmp_path: Path)
         "[axes]\ntheta.values = [5]\nmu_s.values = [0.38]\n"
         "amplitude.values = [6.8]\nfrequency.values = [1]\n"
     )
-    store.run(sweep_job(spec.parse(text, "x")), tmp_path / "a.nc", command="x")
+    running.run(sweep_job(spec.parse(text, "x")), tmp_path / "a.nc", command="x")
     export.export(tmp_path / "a.nc", tmp_path / "a.csv", words=True)
     (flags,) = bare(read(tmp_path / "a.csv"))["validity"]
     assert flags == "near_mode_limit friction_estimated"
@@ -299,7 +298,7 @@ def test_a_pivoted_table_of_a_result_has_the_axes_of_that_result(
     folder: Path, tmp_path: Path
 ) -> None:
     text = GRID.replace("displacement_amplitude", "amplitude")
-    store.run(sweep_job(spec.parse(text, "x")), tmp_path / "a.nc", command="x")
+    running.run(sweep_job(spec.parse(text, "x")), tmp_path / "a.nc", command="x")
     assert export.export(tmp_path / "a.nc", tmp_path / "t.xlsx", columns="theta") == 3 * 24 + 12
     sheet = pd.read_excel(tmp_path / "t.xlsx", sheet_name="limiting_acceleration")
     names = [header.partition(" ")[0] for header in map(str, sheet)]
@@ -383,7 +382,7 @@ def test_a_spreadsheet_says_what_it_is_of(folder: Path, tmp_path: Path) -> None:
 
 def test_a_label_is_no_formula(tmp_path: Path) -> None:
     text = CASES.replace("steep", "=1+1")
-    store.run(sweep_job(spec.parse(text, "x")), tmp_path / "a.nc", command="x")
+    running.run(sweep_job(spec.parse(text, "x")), tmp_path / "a.nc", command="x")
     export.export(tmp_path / "a.nc", tmp_path / "t.xlsx")
     table = openpyxl.load_workbook(tmp_path / "t.xlsx").worksheets[0]
     kinds = {

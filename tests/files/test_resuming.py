@@ -161,7 +161,7 @@ CELL_BYTES = 2 * (8 + 8 + 1 + 2) + 8
 @pytest.fixture
 def interrupted_at_2400_cells(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Output of a run of three chunks, which fill the memory asked for; two are kept."""
-    monkeypatch.setattr(running, "_BASE_MEMORY", 0)
+    monkeypatch.setattr(running, "BASE_MEMORY", 0)
     monkeypatch.setattr(running, "CHUNK_CELLS", 100)  # without a limit; else cells fill the memory
     (folder / "sweep.toml").write_text(WAVE.replace("num = 4", "num = 400"))
     with pytest.raises(RunError, match="No space"):

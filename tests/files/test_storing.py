@@ -91,9 +91,9 @@ def test_chunks_on_the_way_from_workers_count_as_memory(folder: Path, workers: i
     """Each worker solves one and two wait for it, beside two here; never more than asked for."""
     plan = job_of(folder, "sweep").plan
     results = sum(np.dtype(dtype).itemsize for dtype in job_of(folder, "sweep").dtypes.values())
-    base = running._BASE_MEMORY + workers * running._WORKER_MEMORY
+    base = running.BASE_MEMORY + workers * running._WORKER_MEMORY
     for memory in (base + 10**8, base + 10**9):
-        most = running._most_cells(plan, memory, workers)
+        most = running.most_cells(plan, memory, workers)
         taken = base + most * (2 + 3 * workers) * results
         assert 0.7 * memory < taken + 8 * most <= memory
 

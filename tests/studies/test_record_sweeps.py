@@ -11,8 +11,7 @@ import pytest
 import xarray as xr
 
 from slipsweep import InputError, read_record, sweep
-from slipsweep.files import running as store
-from slipsweep.files import spec
+from slipsweep.files import running, spec
 from slipsweep.files.jobs import sweep_job
 from slipsweep.model.variables import DEFAULT_RECORD_RESULTS
 
@@ -40,8 +39,8 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def run(sweep: Path, path: Path, **options: Any) -> store.Report:
-    return store.run(sweep_job(spec.load(sweep)), path, command="slipsweep run a.toml", **options)
+def run(sweep: Path, path: Path, **options: Any) -> running.Report:
+    return running.run(sweep_job(spec.load(sweep)), path, command="slipsweep run a.toml", **options)
 
 
 def assert_same_data(one: Path, other: Path) -> None:

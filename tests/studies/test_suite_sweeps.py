@@ -10,8 +10,7 @@ import pytest
 import xarray as xr
 
 from slipsweep import InputError, Suite, read_suite, sweep
-from slipsweep.files import running as store
-from slipsweep.files import spec
+from slipsweep.files import running, spec
 from slipsweep.files.jobs import limit_job
 from slipsweep.files.motions import read_embedded
 from slipsweep.files.opening import read_result
@@ -108,8 +107,8 @@ def test_a_result_repeats_itself_without_the_motions(folder: Path, text: str) ->
 def test_limits_of_a_suite(folder: Path) -> None:
     text = SWEEP.replace("[0.1, 0.3]", "[0.1]").replace("[0, 5, 25]", "[5]")
     job = limit_job(spec.parse(text, "a.toml", folder), [0.01, 0.1])
-    store.run(job, folder / "l.nc", command="slipsweep limit a.toml")
-    store.run(job, folder / "m.nc", command="slipsweep limit a.toml")
+    running.run(job, folder / "l.nc", command="slipsweep limit a.toml")
+    running.run(job, folder / "m.nc", command="slipsweep limit a.toml")
     assert_same_data(folder / "l.nc", folder / "m.nc")
     with xr.open_dataset(folder / "l.nc") as result:
         assert result.limit_amplitude.dims == (

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 #: Resident memory, in bytes, of a run, and of a worker of this machine, without its chunks.
-_BASE_MEMORY = 430_000_000
+BASE_MEMORY = 430_000_000
 _WORKER_MEMORY = 250_000_000
 
 #: Chunks for each worker, so that all workers end at about the same time, and the least work of a
@@ -106,7 +106,7 @@ def run(
     if resume and (complete := _complete(job, path)) is not None:
         return Report(path, tally_of(complete), was_complete=True)
     processes = workers or (64 if scheduler else 0)
-    most = _most_cells(plan, memory, workers or 0)
+    most = most_cells(plan, memory, workers or 0)
     lengths = chunk_lengths(plan.sizes, _chunk_cells(plan, most, processes), plan.together)
     chunks = (ZarrChunks if is_zarr else Chunks)(job, path, lengths, most)
     if lengths == plan.sizes and not is_zarr and not processes and not Path(chunks.place).exists():
@@ -152,11 +152,11 @@ def _complete(job: Job, path: Place) -> xr.Dataset | None:
     return table
 
 
-def _most_cells(plan: Plan, memory: int | None, workers: int) -> float:
+def most_cells(plan: Plan, memory: int | None, workers: int) -> float:
     """Return the number of cells of a chunk that the memory holds; infinity: it is not limited."""
     if memory is None:
         return math.inf
-    base = _BASE_MEMORY + plan.memory + workers * (_WORKER_MEMORY + plan.memory)
+    base = BASE_MEMORY + plan.memory + workers * (_WORKER_MEMORY + plan.memory)
     results = sum(
         result.dtype.itemsize
         * math.prod(size for dim, size in result.sizes.items() if dim not in plan.sizes)

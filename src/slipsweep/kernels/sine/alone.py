@@ -36,7 +36,7 @@ from slipsweep.kernels.sine.batch import (
 )
 from slipsweep.kernels.sine.pulse import fall
 from slipsweep.model import equations as eq
-from slipsweep.model import friction as law
+from slipsweep.model.friction import exponential_decay_length, exponential_inflection
 
 #: Panels of the quadrature end where |Üg| has grown by so many decay lengths of the friction.
 _PANEL_ENDS = (MOST_E_FOLDINGS, 16.0, 32.0, math.inf)
@@ -73,7 +73,7 @@ def eq4_gains(batch: Batch, j: int, start: float, end: float, g: float) -> Gains
     amplitude = batch.amplitude[j]
     mu_s = batch.mu_s[j]
     tan_theta = batch.tan_theta[j]
-    length = law.exponential_decay_length(batch.decay_rate[j], g)
+    length = exponential_decay_length(batch.decay_rate[j], g)
     x_start = amplitude * (1.0 - versine(start))
     x_end = amplitude * (1.0 - versine(end))
     e_foldings = (x_end - x_start) / length
@@ -141,7 +141,7 @@ def find_places(batch: Batch, j: int, start: float, end: float, g: float) -> Non
     places = batch.places[j]
     places[0] = start
     last = 0
-    bend = law.exponential_inflection(batch.tan_theta[j], batch.decay_rate[j], g)
+    bend = exponential_inflection(batch.tan_theta[j], batch.decay_rate[j], g)
     low = start
     lag, slope = relative_acceleration(batch, j, start, g)
     for high in (bend if start < bend < end else end, end):
