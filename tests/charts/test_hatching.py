@@ -77,8 +77,8 @@ def test_what_no_block_does_is_marked_and_its_share_told(lined: xr.Dataset) -> N
     xs, ys = line.get_data()
     np.testing.assert_array_equal(np.isin(amplitudes, xs[np.isfinite(ys)]), falls | below)
     share = [f"{100 * one.sum() / shown.sum():.2g} %" for one in (falls | below, falls, below)]
-    falls = f"The displacement falls with A in {share[1]}"
-    trends = f"{falls} and lies below half of Newmark's in {share[2]}"
+    falling = f"The displacement falls with A in {share[1]}"
+    trends = f"{falling} and lies below half of Newmark's in {share[2]}"
     assert f"{share[0]} of the sliding cells shown. {trends}" in caption(figure)
     ratio = lined.slipsweep.chart("newmark", at={"mu_s": 0.25, "frequency": 1})
     cells = np.stack([np.full_like(amplitudes, 14.0), amplitudes], axis=-1)

@@ -44,11 +44,11 @@ RECTANGLE = int(StepRule.RECTANGLE)
 TRAPEZOID = int(StepRule.TRAPEZOID)
 SIMPSON = int(StepRule.SIMPSON)
 
-#: Stages of the rules: each evaluates the rate at a node, a part of the step, from the second on
-#: reached with the rate of the stage before it; their weights in the gain of V, over h, and of W,
-#: over h².
-STAGES = np.array([1, 1, 3])  # after the first, which is known from the step before
-NODES = np.array([[0, 1, 0, 0], [0, 1, 0, 0], [0, 1 / 2, 1 / 2, 1]])
+#: The rules in stages (`advance_by_stages`).  A stage evaluates the rate at its node, a part of the
+#: step, with V there by the rate of the stage before.  The weights of its rate are those in the
+#: gain of V, over h, and in that of W, over h².
+STAGES = np.array([0, 1, 3])  # after the first, whose rate is known from the step before
+NODES = np.array([[0, 0, 0, 0], [0, 1, 0, 0], [0, 1 / 2, 1 / 2, 1]])
 VELOCITY_WEIGHTS = np.array([[1, 0, 0, 0], [1 / 2, 1 / 2, 0, 0], [1 / 6, 2 / 6, 2 / 6, 1 / 6]])
 DISPLACEMENT_WEIGHTS = np.array([[1 / 2, 0, 0, 0], [1 / 3, 1 / 6, 0, 0], [1 / 6, 1 / 6, 1 / 6, 0]])
 
@@ -61,7 +61,7 @@ HELD_ON = 4  # from t5 on with recoupling = "integrate": Ü = b still
 CONTINUOUS = 5  # continuous sliding: Ü by Eq. 4, V of either sign
 SLIDES = 6  # Newmark's block (`kernels.step_newmark`): Ü = Üy, or V < 0 and Ü = −Üy,up
 
-#: How a phase ends in a step.
+#: What happens to a phase in a step.
 GOES_ON = 0
 STOPS = 1  # V = 0
 CHANGES = 2  # from HELD to FOLLOWS, or back
@@ -71,11 +71,13 @@ WEAKENED = 3  # from here on the law does not depend on the slip
 class Law(NamedTuple):
     """A friction law μ(block, Üg, v, s), and the block that it acts on.
 
-    v is the relative velocity in m/s, s = ∫|v|dt the slip in m.  `knows_motion` says whether μ
-    depends on v or s, `knows_slip` whether on s.  `longest_step`, of the block and the rate of V,
-    is the longest step that resolves the law (`unlimited`, if the default steps do).  The rest says
-    what the block does: its rate while it slides, how it waits, and how it comes to rest after the
-    shaking.  `step_cells.paper_law` makes the law of a block of the paper.
+    v is the relative velocity in m/s, s = ∫|v|dt the slip in m; a law of the strength of Newmark's
+    block is given no Üg, and the speed in the direction of the slide (`kernels.step_newmark`).
+    `knows_motion` says whether μ depends on v or s, `knows_slip` whether on s.  `longest_step`, of
+    the block and the rate of V, is the longest step that resolves the law (`unlimited`, if the
+    default steps do).  The rest says what the block does: its rate while it slides, how it waits,
+    and how it comes to rest after the shaking.  `step_cells.paper_law` makes the law of a block of
+    the paper.
     """
 
     friction: Callable[..., float]
@@ -119,7 +121,7 @@ BLOCK = np.dtype(
             ("recoupling", "i8"),
             ("recorded", "i8"),  # under a record, where each pulse has its own friction
             ("rule", "i8"),
-            ("steps", "i8"),  # in 2π of time
+            ("steps", "i8"),  # `steps_per_cycle`, N
             ("phase", "i8"),
             ("in_pulse", "i8"),  # from Üg = Üy to the end of the positive half wave
             ("side", "f8"),  # 1, of a block that slides upslope only −1
@@ -135,7 +137,7 @@ BLOCK = np.dtype(
             ("zero", "f8"),  # time at τ = 0 of the piece
             ("onset", "f8"),  # time at which the slide began
             ("first_step", "f8"),  # the longest one after it
-            ("slips", "f8"),
+            ("slips", "f8"),  # slides that began from rest
             ("stick_slip_pulses", "f8"),
             ("continuous_pulses", "f8"),
             ("validity", "i8"),
@@ -192,7 +194,8 @@ class Steps(NamedTuple):
     pieces: np.ndarray  # those of the path, and silent ones, each twice as long as that before
 
 
-#: How long a step may be after the onset of a slide (`step_along`).  None is shorter than the last.
+#: How long a step may be after the onset of a slide (`step_along`), and the shortest that is taken:
+#: with these even the shortest slides of docs/hard-cases.md have the errors of others.
 GROWTH_SHARE = 64.0
 TIME_SHARE = 16.0
 SHORTEST_STEP = 1e-14
@@ -231,7 +234,7 @@ def eq4_at(law: Law, block: Block, ground: float) -> float:
 
 @inlined
 def rate(law: Law, block: Block, ground: float, velocity: float, slip: float) -> float:
-    """Rate of V, Üg − Ü, in the block's phase; Eq. 12 takes no steps (`attenuate`)."""
+    """Rate of V, Üg − Ü, in the block's phase; Eq. 12 is not stepped by the rules (`attenuate`)."""
     if block.phase == HELD or block.phase == HELD_ON:
         return ground - block.held
     return law.sliding_rate(law, block, ground, velocity, slip)
@@ -264,7 +267,8 @@ def advance(
 ) -> Step:
     """Find what a step h gains: V += (Üg − Ü) h.
 
-    Where friction does not depend on the motion, the rules are those of integrals over the step.
+    Where friction does not depend on the motion, the rules are those of integrals over the step,
+    and `velocity`, that at the start, is all that is needed.
     """
     if law.knows_motion:
         return advance_by_stages(law, block, start, middle, end, h, first_rate)
@@ -607,8 +611,9 @@ def wait_for_eq4(
 ) -> float:
     """Return τ at which the paper's block begins to slide while Üg rises beyond Üy: t1.
 
-    That is where Eq. 4 is below Üg.  If that is not so at the end of the step, either, it is `end`;
-    out of a pulse and on a fall it is `until`, and the block does not slide.
+    That is where Eq. 4 is below Üg.  If that is not so at the end of the step, either, it is `end`.
+    Where the block cannot begin to slide, it is `until`, or the end of the piece: out of a pulse,
+    on a fall, and where Üg does not reach Üy.
     """
     if not block.in_pulse or not block.rises:
         return until
@@ -706,12 +711,15 @@ def set_friction(block: Block, peak: float) -> Interface:
 
 @scalar
 def yield_governs(law: Law, block: Block, low: float, high: float) -> bool:
-    """Return True if, with the monotone rise, Eq. 4 is at most Üy for Üg from low to high."""
+    """Return True if, with the monotone rise, Eq. 4 is at most Üy for Üg from low to high.
+
+    Where friction depends on the motion that is not known.
+    """
     for j in range(POINTS_OF_RISE, -1, -1):
         ground = low + (high - low) * (j / POINTS_OF_RISE)
         if eq4_at(law, block, ground) > block.yield_acceleration:
             return False
-    return block.rise == MONOTONE
+    return block.rise == MONOTONE and not law.knows_motion
 
 
 @scalar
@@ -799,7 +807,11 @@ def begin_pulse(law: Law, block: Block, piece: Piece, tau: float, peak: float) -
 
 @scalar
 def slide_on(law: Law, block: Block, points: np.ndarray, h: float, first_rate: float) -> None:
-    """Continuous sliding, which does not end, in equal steps to the end of the piece."""
+    """Continuous sliding, which does not end, in equal steps to the end of the piece.
+
+    V and W are kept out of the block's memory; ∫|V| is not needed, as friction does not depend on
+    the motion.
+    """
     each = 2 if block.rule == SIMPSON else 1
     velocity = block.velocity
     displacement = block.displacement
@@ -841,8 +853,8 @@ def step_along(
 
     `points` is Üg over A at the ends of the steps on the piece, with Simpson's rule in their
     middles, too.  At τ = `pulse` a pulse of that peak begins.  From its onset to the end of the
-    piece a slide takes N/64 steps at least, later a step is at most 16/N of the time since the
-    onset, so that slides shorter than a step are resolved.
+    piece a slide takes N/64 steps at least; later a step is no longer than those, or than 16/N of
+    the time since the onset.  So slides shorter than a step are resolved.
     """
     each = 2 if block.rule == SIMPSON else 1
     count = (points.size - 1) // each

@@ -67,7 +67,8 @@ STEP_CELL = np.dtype(
     )
 )
 
-#: Lengths of time after the shaking, each twice the one before, by which a block has come to rest.
+#: Lengths of time after the shaking, each twice the one before: a block that still slides after as
+#: many never comes to rest.
 DOUBLINGS = 64
 
 
@@ -178,7 +179,10 @@ def walk_cycles(law: Law, block: Block, path: Path, steps: Steps, log: np.ndarra
 
 @scalar
 def run_out(law: Law, block: Block, path: Path, steps: Steps, log: np.ndarray) -> None:
-    """After the shaking Eq. 12 takes V to 0, but that of continuous sliding under a waveform."""
+    """After the shaking Eq. 12 takes V to 0.
+
+    Continuous sliding under a waveform ends with the shaking.
+    """
     end_positive_half_wave(block)
     valueless = block.validity & NO_VALUE != 0
     if valueless or block.phase == STUCK or (block.phase == CONTINUOUS and not block.recorded):
@@ -262,7 +266,7 @@ def put_at_rest(law: Law, block: Block, cell: np.record, options: Options) -> No
 
 @scalar
 def write_results(block: Block, mode: int, validity: int, result: np.ndarray) -> None:
-    """Write what was found of a cell, (`block.RESULTS`,)."""
+    """Write the results of a cell, in the order of `RESULTS` of `kernels.block`."""
     result[3] = float(validity)
     if validity & NO_VALUE:
         result[:3] = math.nan
@@ -362,6 +366,7 @@ def steps_of(path: Path, rule: int, steps: int, steps_on_piece: int) -> Steps:
     each = 2 if rule == SIMPSON else 1
     count = np.full(length.size, steps_on_piece)
     if steps_on_piece == 0:
+        # 1e-9: a quarter of a cycle has N/4 steps whichever way its length is rounded
         count = np.maximum(np.ceil(length / (2.0 * math.pi) * steps - 1e-9), 1).astype(np.int64)
     sizes = each * count + 1
     # from the anchor of the piece, so that two that mirror each other have the same values

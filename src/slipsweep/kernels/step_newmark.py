@@ -39,7 +39,8 @@ from slipsweep.motion.paths import Path, Piece
 #: A block of `kernels.step`.
 Block: TypeAlias = Any
 
-#: Yield acceleration upslope, m/s², where no acceleration moves the block that way.
+#: Yield acceleration upslope, m/s², where no acceleration moves the block that way.  It is finite,
+#: as it has to stop a block whose strength grows so far while it slides.
 LOCKED = 1e9
 
 #: Parts of the time scale of a law that the longest step takes, times the number of steps a cycle.
@@ -57,7 +58,7 @@ def no_friction(block: Block, ground: float, velocity: float, slip: float) -> fl
 
 @scalar
 def resistance(law: Law, block: Block, side: float, velocity: float, slip: float) -> float:
-    """|Ü| of a block that slides downslope (side 1) or upslope (side −1).
+    """Ü against the slide of a block downslope (side 1) or upslope (side −1); below 0 it drives.
 
     That is its yield acceleration, or that of Coulomb with μ at the speed in the direction of the
     slide, which a step may carry a little below 0.
