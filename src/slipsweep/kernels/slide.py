@@ -36,10 +36,10 @@ SLIDE = np.dtype(
                 ("wants_peak", np.bool_),
                 # slides that began from rest
                 ("slips", np.float64),
-                # for the samples of a history: how many are filled, and the phase from the start of
-                # a part to the next; the phase at the beginning of the pulse, and V and W there
-                # that the two above do not have; by how much phases of the path are less than those
-                # of the motion
+                # for the samples of a history: their number so far, and the phase from the start of
+                # a part to the next one; the phase at the beginning of the pulse, V and W there,
+                # to which `velocity` and `displacement` are added; what phases of the path are to
+                # be increased by, as the path has the plain cycle once
                 ("sampled", np.int64),
                 ("since", np.float64),
                 ("began", np.float64),

@@ -154,7 +154,7 @@ def cycles_before(path: Path, walk: Walk) -> int:
 
 @scalar
 def prepare_samples(walk: Walk, path: Path, place: Place, velocity: float, slide: Slide) -> None:
-    """Set what samples of a history in a pulse have besides the slide, as `velocity`."""
+    """Set the phase, V and W at the beginning of a pulse, to which its samples add."""
     piece = path.base.pieces[place.piece]
     slide.began = phase_at(piece, place.tau)
     slide.velocity_before = velocity
@@ -164,7 +164,7 @@ def prepare_samples(walk: Walk, path: Path, place: Place, velocity: float, slide
 
 @scalar
 def begin_cycle(walk: Walk) -> None:
-    """Set what is said of a plain cycle as it begins."""
+    """Note V at the beginning of a plain cycle, with which its extremes begin."""
     walk.entered = walk.velocity
     walk.gained = 0.0
     walk.highest = walk.velocity

@@ -23,7 +23,7 @@ from slipsweep.model.equations import CONTINUOUS, STICK_SLIP, STUCK
 #: Kinds of motion that batches are made of: from Üg = Üy to the peak b = Üy throughout (Newmark's
 #: block, too), or b = Üy and then Eq. 4, or at rest until Eq. 4 falls below Üg; Eq. 4 all the time;
 #: and all others of stick-slip and of continuous sliding, solved one by one (`alone`).
-YIELD_GOVERNS, FOLLOWS_EQ4, STICKS_AT_YIELD, SLIDES_ON, SLIPS_ALONE, SLIDES_ALONE = range(6)
+STAYS_AT_YIELD, FOLLOWS_EQ4, STICKS_AT_YIELD, SLIDES_ON, SLIPS_ALONE, SLIDES_ALONE = range(6)
 KINDS = 6
 #: No motion: stuck, without a value, or as Eq. 4 does not fall below Üg.
 RESTS = 6
@@ -56,7 +56,7 @@ def pulse_kind(batch: Batch, j: int, g: float) -> int:
     smooth = (batch.response_at_peak[j] < end) & (convex | (rises & lags))
     gentle = decay_rate * end <= MOST_E_FOLDINGS * g
     kind = (STICKS_AT_YIELD if sticks else FOLLOWS_EQ4) if gentle else SLIPS_ALONE
-    kind = YIELD_GOVERNS if (not sticks) & (not follows) else kind
+    kind = STAYS_AT_YIELD if (not sticks) & (not follows) else kind
     return kind if smooth else SLIPS_ALONE
 
 
@@ -102,7 +102,7 @@ def classify(batch: Batch, first: int, options: Options, results: np.ndarray) ->
         batch.yield_phase[j] = rising_phase(batch.yield_acceleration[j], batch.amplitude[j])
     if options.rise == NEWMARK:
         for j in range(WIDTH):
-            batch.kind[j] = YIELD_GOVERNS if batch.sliding_mode[j] == STICK_SLIP else RESTS
+            batch.kind[j] = STAYS_AT_YIELD if batch.sliding_mode[j] == STICK_SLIP else RESTS
         return
     for j in range(WIDTH):
         start = batch.yield_acceleration[j]

@@ -24,7 +24,7 @@ from slipsweep.kernels.sine.batch import (
     integrate_eq4,
     relative_acceleration,
 )
-from slipsweep.kernels.sine.kinds import STICKS_AT_YIELD, YIELD_GOVERNS
+from slipsweep.kernels.sine.kinds import STAYS_AT_YIELD, STICKS_AT_YIELD
 from slipsweep.model import equations as eq
 from slipsweep.model.friction import exponential_inflection
 
@@ -107,7 +107,7 @@ def rise(batch: Batch, kind: int, g: float) -> None:
     b is held up to E = b, the switch, and follows Eq. 4 beyond it.
     docs/numerics.md#onset-and-switch
     """
-    if kind == YIELD_GOVERNS:
+    if kind == STAYS_AT_YIELD:
         for j in range(WIDTH):
             batch.held[j] = batch.level[j]
             gained = held_gains(batch.amplitude[j], batch.level[j], batch.start[j], 0.0)

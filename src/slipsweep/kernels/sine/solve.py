@@ -60,7 +60,7 @@ def store(batch: Batch, k: int, kind: int, options: Options, results: np.ndarray
         results[VALIDITY, cell] = UNSOLVED
         return
     validity = int(results[VALIDITY, cell]) | int(batch.validity[k])
-    if kind == kinds.YIELD_GOVERNS and options.rise != NEWMARK:
+    if kind == kinds.STAYS_AT_YIELD and options.rise != NEWMARK:
         validity |= YIELD_GOVERNS
     validity = settled(without_estimates(validity), displacement, batch.amplitude[k])
     valueless = validity & NO_VALUE != 0
