@@ -218,11 +218,17 @@ def unlimited(block: Block, first_rate: float) -> float:
 
 
 @inlined
-def eq4_rate(law: Law, block: Block, ground: float, velocity: float, slip: float) -> float:
-    """Üg − Ü with Ü by Eq. 4; positive where a block at rest begins to slide."""
-    friction = law.friction(
+def friction_at(law: Law, block: Block, ground: float, velocity: float, slip: float) -> float:
+    """μ by the law, at V and after ∫|V|."""
+    return law.friction(
         block, ground, velocity * block.seconds, slip * block.seconds * block.seconds
     )
+
+
+@inlined
+def eq4_rate(law: Law, block: Block, ground: float, velocity: float, slip: float) -> float:
+    """Üg − Ü with Ü by Eq. 4; positive where a block at rest begins to slide."""
+    friction = friction_at(law, block, ground, velocity, slip)
     return eq.relative_acceleration(ground, friction, block.mu_s, block.tan_theta, block.g)
 
 

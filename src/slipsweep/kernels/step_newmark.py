@@ -18,21 +18,20 @@ from slipsweep.jit.decorators import inlined, registered, scalar
 from slipsweep.jit.elementary import exp
 from slipsweep.kernels.block import NOT_AT_REST, Options
 from slipsweep.kernels.step import (
-    ATTENUATES,
     GROWTH_SHARE,
     SLIDES,
     STUCK,
     Law,
     Steps,
-    attenuate,
     begin_slide,
+    friction_at,
     ground_at,
     place_beyond,
     rest,
     unlimited,
     walk,
 )
-from slipsweep.kernels.step_cells import solve_cells
+from slipsweep.kernels.step_cells import run_out, solve_cells
 from slipsweep.model import equations as eq
 from slipsweep.motion.paths import Path, Piece
 
@@ -63,9 +62,7 @@ def resistance(law: Law, block: Block, side: float, velocity: float, slip: float
     That is its yield acceleration, or that of Coulomb with μ at the speed in the direction of the
     slide, which a step may carry a little below 0.
     """
-    friction = law.friction(
-        block, 0.0, side * velocity * block.seconds, slip * block.seconds * block.seconds
-    )
+    friction = friction_at(law, block, 0.0, side * velocity, slip)
     if math.isnan(friction):
         return block.yield_acceleration if side > 0.0 else block.upslope_yield_acceleration
     if side < 0.0 and friction * block.tan_theta >= 1.0:
@@ -116,15 +113,13 @@ def come_to_rest(law: Law, block: Block, path: Path, steps: Steps, log: np.ndarr
 
     A block that is at rest then, but too weak to stay there, has no value, either.
     """
+    if not law.knows_motion:
+        block.held = resistance(law, block, block.side, 0.0, 0.0)
+        run_out(law, block, path, steps, log)
+        return
     offset = 2.0 * math.pi * max(path.repeats - 1, 0)
     p = path.base.pieces.size
-    end = steps.pieces[p].start + offset
-    if not law.knows_motion and block.phase != STUCK:
-        block.held = resistance(law, block, block.side, 0.0, 0.0)
-        block.phase = ATTENUATES
-        attenuate(block, log, end, math.inf)
-        return
-    block.onset = end
+    block.onset = steps.pieces[p].start + offset
     block.first_step = math.inf
     while block.phase != STUCK and p < steps.pieces.size:
         slip = block.slip

@@ -85,7 +85,7 @@ def solve_batch(batch: Batch, kind: int, options: Options, results: np.ndarray) 
         repeat(batch, kind, options)
     else:
         if kind == kinds.SLIDES_ALONE:
-            for j in range(WIDTH):
+            for j in range(used):
                 slide_alone(batch, j, options)
         else:
             slide_through_quarter(batch, options.g)
