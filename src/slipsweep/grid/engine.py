@@ -7,6 +7,7 @@ of a cell.
 """
 
 import math
+import threading
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
@@ -244,6 +245,24 @@ def _scaled_dimension(request: Request) -> str | None:
     return max(scaled, key=lambda dim: scaled[dim], default=None)
 
 
+class Workspace:
+    """Arrays of a tile's cells and results, which all tiles of a thread use.
+
+    New arrays for each would come as new pages of memory, which take as long as the cells.
+    """
+
+    def __init__(self, solver: solvers.Solver, tile: int) -> None:
+        self._cells = np.empty(tile, solver.cell)
+        self._rows = np.empty((1 + max(solver.rows.values())) * tile)
+        self._row_count = 1 + max(solver.rows.values())
+
+    def arrays(self, count: int) -> tuple[NDArray[Any], NDArray[np.float64]]:
+        """Return cells whose fields are all NaN, and the rows of their results."""
+        cells = self._cells[:count]
+        cells.view(np.float64)[:] = math.nan
+        return cells, self._rows[: self._row_count * count].reshape(self._row_count, count)
+
+
 def _fill(
     results: Variables, request: Request, solver: solvers.Solver, finite: bool = True
 ) -> None:
@@ -254,6 +273,7 @@ def _fill(
     share = math.prod(solved.values()) // (8 * threads.thread_count())
     tile = max(min(max(share, _LEAST_TILE), _MOST_TILE) // solvers.cost_of(request.problem), 1)
     arrays = {name: values.set_dims(dims).values for name, values in request.inputs.items()}
+    workspaces = threading.local()
 
     def work(chunk: Chunk) -> None:
         where = [chunk.get(dim, slice(None)) for dim in dims]
@@ -266,7 +286,9 @@ def _fill(
             )
             inputs[name] = values[(*place, ...)]
         shape = tuple(chunk[dim].stop - chunk[dim].start if dim in chunk else 1 for dim in dims)
-        _fill_tile(targets, request.problem, inputs, shape, solver, finite)
+        if not hasattr(workspaces, "own"):
+            workspaces.own = Workspace(solver, tile)
+        _fill_tile(targets, request.problem, inputs, shape, solver, workspaces.own, finite)
         request.count(next(iter(targets.values())).size)
 
     threads.spread(list(grid_chunks(solved, tile)), work)
@@ -278,6 +300,7 @@ def _fill_tile(
     inputs: Mapping[str, NDArray[Any]],
     shape: tuple[int, ...],
     solver: solvers.Solver,
+    workspace: "Workspace",
     finite: bool,
 ) -> None:
     """Solve the cells of a tile, and write the results at all frequencies of each cell.
@@ -286,12 +309,12 @@ def _fill_tile(
     """
     names = solver.cell.names
     assert names is not None
-    cells = np.full((*shape, len(names)), math.nan).view(solver.cell)[..., 0]
+    cells, rows = workspace.arrays(math.prod(shape))
+    cells = cells.reshape(shape)
     with np.errstate(all="ignore"):  # results that overflow are refused below
         for name, values in cell_inputs(problem, inputs).items():
             if name in names:
                 cells[name] = values
-        rows = np.empty((1 + max(solver.rows.values()), cells.size))
         solver.solve(cells.reshape(-1), rows)
         validity = rows[solver.rows["validity"]].reshape(shape).astype(np.int16)
         is_unsolved = validity & UNSOLVED != 0

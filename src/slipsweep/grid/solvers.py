@@ -124,7 +124,8 @@ def sine_solver(motion: Sine, options: block.Options) -> Solver:
         solve_sine(cells, options, True, results)
 
     def walk(cells: np.ndarray, results: np.ndarray) -> None:
-        solve_walk(cells, options, cutting.path_of_waveform(motion), *workspace_of(), results)
+        path = cutting.path_of_waveform(motion)
+        solve_walk(cells, options, path, *workspace_of(path), results)
 
     def solve(cells: np.ndarray, results: np.ndarray) -> None:
         solve_in_batches(cells, results)
@@ -143,7 +144,7 @@ def walk_solver(motion: Waveform | Record, options: block.Options, polarity: flo
     path = path_under(motion, polarity)
 
     def solve(cells: np.ndarray, results: np.ndarray) -> None:
-        solve_walk(cells, options, path, *workspace_of(), results)
+        solve_walk(cells, options, path, *workspace_of(path), results)
 
     return Solver(solve, ROWS)
 
@@ -277,7 +278,7 @@ def cost_of(problem: Problem) -> int:
     if isinstance(motion, Waveform):
         if steps:
             return 1 + steps // 16
-        return 1 if is_plain_sine(motion) and not slides_both_ways(problem.model) else 16
+        return 1 if is_plain_sine(motion) and not slides_both_ways(problem.model) else 4
     records = motion if isinstance(motion, Suite) else (motion,)
     samples = max(record.times.size for record in records)
     if isinstance(problem.model, Newmark) and not steps:

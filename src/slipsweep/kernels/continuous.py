@@ -4,6 +4,7 @@ docs/numerics.md#continuous-sliding
 """
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from slipsweep.jit.decorators import scalar, single
 from slipsweep.kernels.base import offset_at, phase_at
 from slipsweep.kernels.eq4 import (
     Block,
+    LagIntegrals,
     eq4_gains,
     inflection,
     lag_integrals,
@@ -28,6 +30,17 @@ from slipsweep.kernels.slide import (
 )
 from slipsweep.kernels.stick_slip import Place, attenuate, inside, next_break
 from slipsweep.motion.paths import Base, Path
+
+#: `LagIntegrals` over a whole piece of a wave's cycle, once they are known.
+KEPT_LAGS = np.dtype(
+    (
+        np.record,
+        np.dtype(
+            [(name, np.float64) for name in LagIntegrals._fields] + [("known", np.bool_)],
+            align=True,
+        ),
+    )
+)
 
 
 @scalar
@@ -79,11 +92,43 @@ def most_gained(block: Block, base: Base, p: int, start: float, end: float, slid
     return most
 
 
+@single
+def lag_on(
+    block: Block, base: Base, p: int, begin: float, end: float, place: int, slide: Slide, lags: Any
+) -> LagIntegrals:
+    """Return `LagIntegrals` on piece p; of a whole curve they are kept, by `place` in the cycle."""
+    piece = base.pieces[p]
+    curve = base.curves[piece.curve]
+    is_whole = begin == piece.begin and end == piece.finish
+    if piece.degree <= 1 or place >= lags.size or not is_whole:
+        return lag_integrals(block, piece, curve, begin, end, slide)
+    kept = lags[place]
+    if not kept.known:
+        lag = lag_integrals(block, piece, curve, begin, end, slide)
+        kept.first = lag.first
+        kept.second = lag.second
+        kept.first_x = lag.first_x
+        kept.second_x = lag.second_x
+        kept.known = True
+    return LagIntegrals(kept.first, kept.second, kept.first_x, kept.second_x)
+
+
 @scalar
 def follow_eq4(
-    block: Block, base: Base, start: Place, until: Place, slide: Slide, samples: np.ndarray
+    block: Block,
+    base: Base,
+    start: Place,
+    until: Place,
+    first: int,
+    slide: Slide,
+    lags: np.ndarray,
+    samples: np.ndarray,
 ) -> None:
-    """Follow Eq. 4 from a place, where V and W are 0, to another one."""
+    """Follow Eq. 4 from a place, where V and W are 0, to another one.
+
+    In a cycle of a wave, which begins with the piece `first`, `lags` has what is known of whole
+    pieces; for a record it is empty.
+    """
     begin_pulse(slide, 0.0)
     slide.kind = SLIDES_ON
     # apart, because over a symmetric cycle they cancel to the last digit
@@ -107,7 +152,7 @@ def follow_eq4(
         if slide.zero_counts[0] + slide.zero_counts[1] > 0:
             most = velocity + most_gained(block, base, p, begin, end, slide)
             slide.peak = max(most, slide.peak)  # in this order a NaN is kept
-        lag = lag_integrals(block, piece, curve, begin, end, slide)
+        lag = lag_on(block, base, p, begin, end, p - first, slide, lags)
         side_g = math.copysign(block.g, piece.top)
         slide.displacement += (
             velocity * (end - begin) + side_g * lag.second + block.tan_theta * lag.second_x
@@ -132,6 +177,7 @@ def continuous_pulse(
     next_place: Place,
     velocity: float,
     slide: Slide,
+    lags: np.ndarray,
     samples: np.ndarray,
 ) -> None:
     """Go from Üg = Üy in interval k of a record, entered with a `velocity`, to the next pulse.
@@ -153,7 +199,7 @@ def continuous_pulse(
         if following == k + 1 and path.intervals[following].first == until:
             place = next_place
             ends = begins
-    follow_eq4(block, path.base, start, place, slide, samples)
+    follow_eq4(block, path.base, start, place, start.piece, slide, lags, samples)
     began = phase_at(path.base.pieces[start.piece], start.tau)
     slide.displacement += velocity * (ends - began)
     slide.velocity += velocity

@@ -32,12 +32,12 @@ def fill_history(
     """
     cells = np.array([tuple(cell)], CELL)
     results = np.empty((len(Motion._fields), 1))
-    walks, slides, samples = workspace_of(phases.size)
+    walks, slides, lags, samples = workspace_of(path, phases.size)
     ground = cell.amplitude * values_at(path, phases)
     samples[sampling.PHASE] = phases
     samples[sampling.GROUND_ACCELERATION] = ground
     samples[sampling.BLOCK_ACCELERATION] = ground  # at rest
-    solve_walk(cells, options, path, walks, slides, samples, results)
+    solve_walk(cells, options, path, walks, slides, lags, samples, results)
     # after a wave a block that slides continuously keeps its velocity
     after = int(slides[0].sampled)
     samples[sampling.VELOCITY, after:] = walks[0].velocity

@@ -34,7 +34,12 @@ from slipsweep.kernels.block import (
     settled,
     store,
 )
-from slipsweep.kernels.continuous import continuous_pulse, find_velocity_extremes, follow_eq4
+from slipsweep.kernels.continuous import (
+    KEPT_LAGS,
+    continuous_pulse,
+    find_velocity_extremes,
+    follow_eq4,
+)
 from slipsweep.kernels.eq4 import Block, block_of, stays_at_yield
 from slipsweep.kernels.grid import cell_at
 from slipsweep.kernels.slide import SLIDE, Slide, begin_pulse
@@ -243,6 +248,7 @@ def walk_pulses(
     path: Path,
     walk: Walk,
     slide: Slide,
+    lags: np.ndarray,
     samples: np.ndarray,
 ) -> None:
     """Go from pulse to pulse.
@@ -253,6 +259,8 @@ def walk_pulses(
     plain = path.cycles[path.lead].first
     plain_end = path.cycles[path.lead + 1].first if path.repeats > 0 else plain
     continuous = False
+    following = -1
+    ends = Place(0, 0.0)
     walk.interval = first_pulse(block, path, walk.interval)
     while walk.interval < path.intervals.size and walk.validity & NO_VALUE == 0:
         if samples.size and slide.sampled == samples.shape[1]:
@@ -272,7 +280,7 @@ def walk_pulses(
             walk.validity |= flags_of_pulse(cell, block, interface, continuous, peak)
             if walk.validity & NO_VALUE:
                 break
-        start = beginning(block, path, k)
+        start = ends if k == following else beginning(block, path, k)
         following = first_pulse(block, path, k + 1)
         ends = beginning(block, path, following)
         if samples.size:
@@ -281,7 +289,8 @@ def walk_pulses(
         flags = 0
         if continuous:
             find_velocity_extremes(block, options.wants_peak, path, slide)
-            continuous_pulse(block, path, k, start, following, ends, walk.velocity, slide, samples)
+            velocity = walk.velocity
+            continuous_pulse(block, path, k, start, following, ends, velocity, slide, lags, samples)
         else:
             # v never goes below 0: a velocity upslope, left by a continuous pulse, is neglected
             begin_pulse(slide, max(walk.velocity, 0.0))
@@ -310,7 +319,13 @@ def walk_pulses(
 
 @single
 def slide_through_cycles(
-    block: Block, options: Options, path: Path, walk: Walk, slide: Slide, samples: np.ndarray
+    block: Block,
+    options: Options,
+    path: Path,
+    walk: Walk,
+    slide: Slide,
+    lags: np.ndarray,
+    samples: np.ndarray,
 ) -> None:
     """Slide continuously from the first Üg ≥ Üy to the end of a wave.
 
@@ -320,6 +335,7 @@ def slide_through_cycles(
     start = beginning(block, path, first_pulse(block, path, walk.interval))
     find_velocity_extremes(block, options.wants_peak, path, slide)
     shape = -1  # of the cycle whose gains are in `walk.gained` and the two that follow
+    shape_of_lags = -1
     cycle_velocity = 0.0
     while walk.done < options.cycles:
         if samples.size and slide.sampled == samples.shape[1]:
@@ -337,7 +353,12 @@ def slide_through_cycles(
         if slides and (new or samples.size):
             if samples.size:
                 prepare_samples(walk, path, place, walk.velocity, slide)
-            follow_eq4(block, path.base, place, end, slide, samples)
+            if path.cycles[c].shape != shape_of_lags:
+                shape_of_lags = path.cycles[c].shape
+                for i in range(lags.size):
+                    lags[i].known = False
+            first = path.cycles[c].first
+            follow_eq4(block, path.base, place, end, first, slide, lags, samples)
             shape = path.cycles[c].shape if walk.slips > 0.0 else -1
             cycle_velocity = slide.velocity
             walk.gained = slide.displacement
@@ -421,6 +442,7 @@ def solve_walk(
     path: Path,
     walks: np.ndarray,
     slides: np.ndarray,
+    lags: np.ndarray,
     samples: np.ndarray,
     results: np.ndarray,
 ) -> None:
@@ -445,12 +467,18 @@ def solve_walk(
         if walk.validity & NO_VALUE or highest <= block.yield_acceleration:
             pass
         elif series:
-            slide_through_cycles(block, options, path, walk, slide, samples)
+            slide_through_cycles(block, options, path, walk, slide, lags, samples)
         else:
-            walk_pulses(cell, block, options, path, walk, slide, samples)
+            walk_pulses(cell, block, options, path, walk, slide, lags, samples)
         store(motion_of(cell, path, mode, walk), j, results)
 
 
-def workspace_of(count: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return what `solve_walk` writes into: the walk, the slide, and so many samples."""
-    return np.zeros(1, WALK), np.zeros(1, SLIDE), np.zeros((5, count))
+def workspace_of(path: Path, count: int = 0) -> tuple[np.ndarray, ...]:
+    """Return what `solve_walk` writes into: walk, slide, lags on a cycle, and `count` samples."""
+    most = 0 if path.recorded else int(np.diff(path.cycles["first"]).max())
+    return (
+        np.zeros(1, WALK),
+        np.zeros(1, SLIDE),
+        np.zeros(most, KEPT_LAGS),
+        np.zeros((5, count)),
+    )

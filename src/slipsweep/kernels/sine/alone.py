@@ -36,7 +36,11 @@ from slipsweep.kernels.sine.batch import (
 )
 from slipsweep.kernels.sine.pulse import fall
 from slipsweep.model import equations as eq
-from slipsweep.model.friction import exponential_decay_length, exponential_inflection
+from slipsweep.model.friction import (
+    exponential_decay_length,
+    exponential_derivatives,
+    exponential_inflection,
+)
 
 #: Panels of the quadrature end where |Üg| has grown by so many decay lengths of the friction.
 _PANEL_ENDS = (MOST_E_FOLDINGS, 16.0, 32.0, math.inf)
@@ -124,7 +128,9 @@ def _quantity(
         return value, slope
     if quantity == Quantity.RESPONSE:
         return x - value - level, 1.0 - slope
-    return 1.0 - slope - level, 0.0  # found by halving
+    first, second = exponential_derivatives(friction(batch, j, x, g), batch.decay_rate[j], g)
+    curvature = eq.relative_acceleration_curvature(x, first, second, batch.tan_theta[j], g)
+    return 1.0 - slope - level, -curvature
 
 
 root = root_of(_quantity)
@@ -135,7 +141,7 @@ def find_places(batch: Batch, j: int, start: float, end: float, g: float) -> Non
     """Set `places` of cell j to Üg on the way from `start` to `end` where E turns or D is 0.
 
     Both ends are places, too; `last_place` is the number of the last.  Of each `phases` has ψ, and
-    `responses` E.
+    `responses` E.  `advances` says if D > 0 from a place to the next.
     docs/numerics.md#slope-and-inflection
     """
     places = batch.places[j]
@@ -177,6 +183,10 @@ def find_places(batch: Batch, j: int, start: float, end: float, g: float) -> Non
     for i in range(last + 1):
         batch.phases[j, i] = rising_phase(abs(places[i]), amplitude)
         batch.responses[j, i] = places[i] - relative_acceleration(batch, j, places[i], g)[0]
+    for i in range(last):
+        psi = 0.5 * (batch.phases[j, i] + batch.phases[j, i + 1])
+        middle = math.copysign(amplitude * (1.0 - versine(psi)), end)
+        batch.advances[j, i] = 1 if relative_acceleration(batch, j, middle, g)[0] > 0.0 else 0
 
 
 # ----------------------------------------------------------------------------------- stick-slip
@@ -203,8 +213,7 @@ def rise_alone(batch: Batch, j: int, options: Options) -> None:
         x = batch.places[j, i]
         response = batch.responses[j, i]
         response_at_end = batch.responses[j, i + 1]
-        middle = amplitude * (1.0 - versine(0.5 * (start + end)))
-        advances = relative_acceleration(batch, j, middle, g)[0] > 0.0
+        advances = batch.advances[j, i] > 0
         while slides or advances:
             if not slides:
                 # t1; where D = 0, E is x but for rounding

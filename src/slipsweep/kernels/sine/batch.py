@@ -20,12 +20,9 @@ from slipsweep.model.friction import exponential_derivatives
 #: Cells of a batch.  Its iterations end with that of the slowest cell.
 WIDTH = 32
 
-#: Cells that a batch has room for: those of a batch and those that wait for the next one.
-ROOM = 2 * WIDTH
-
 HALF_PI = 0.5 * math.pi
 
-#: The block of a cell (`kernels.block`), and ψ at which Üg = Üy.
+#: The block of a cell (`kernels.block`), ψ at which Üg = Üy, and the flags known before the motion.
 BLOCK = (
     "amplitude",
     "yield_acceleration",
@@ -34,6 +31,7 @@ BLOCK = (
     "delta_mu",
     "decay_rate",
     "yield_phase",
+    "validity_before",
 )
 
 #: Quantities of the cells of a batch that is solved, each (WIDTH,).
@@ -87,17 +85,17 @@ MOST_PLACES = 16
 BATCH = np.dtype(
     (
         np.record,
-        [(name, np.float64, (ROOM,)) for name in BLOCK]
-        + [(name, np.float64, (WIDTH,)) for name in QUANTITIES]
+        [(name, np.float64, (WIDTH,)) for name in (*BLOCK, *QUANTITIES)]
         # the number of the cell in the results, the kind of its motion (`kinds`), the number of
-        # cells; the places of each cell: Üg, ψ and E
+        # cells; the places of each cell: Üg, ψ, E, and if D > 0 from there to the next
         + [
-            ("cell", np.int64, (ROOM,)),
+            ("cell", np.int64, (WIDTH,)),
             ("kind", np.int64, (WIDTH,)),
             ("used", np.int64),
             ("places", np.float64, (WIDTH, MOST_PLACES)),
             ("phases", np.float64, (WIDTH, MOST_PLACES)),
             ("responses", np.float64, (WIDTH, MOST_PLACES)),
+            ("advances", np.int64, (WIDTH, MOST_PLACES)),
         ],
     )
 )
@@ -116,6 +114,12 @@ NODES, WEIGHTS = (
     (a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(12), (1.0, 0.0), strict=True)
 )
 MOST_E_FOLDINGS = 6.0
+
+#: The same rule of 8 nodes, right to 1e-13 of parts of continuous sliding up to `SHORT` radians.
+SHORT_NODES, SHORT_WEIGHTS = (
+    (a + s) / 2 for a, s in zip(np.polynomial.legendre.leggauss(8), (1.0, 0.0), strict=True)
+)
+SHORT = 0.55
 
 #: Newton's iteration has converged when its last step is smaller than this part of the value:
 #: an error of 1e-14 is left.
@@ -170,6 +174,13 @@ def relative_acceleration(batch: Batch, j: int, x: float, g: float) -> tuple[flo
 
 
 @inlined
+def static_acceleration(batch: Batch, j: int, g: float) -> float:
+    """Return nearly |Üg| where μ = μs: after ln(1 + r) ≈ 2r/(2 + r) e-foldings, r = Δμ/μs."""
+    delta_mu = batch.delta_mu[j]
+    return 2.0 * delta_mu * g / ((2.0 * batch.mu_s[j] + delta_mu) * batch.decay_rate[j])
+
+
+@inlined
 def held_gains(amplitude: float, held: float, start: float, end: float) -> tuple[float, float]:
     """Return the gains of V and W from rest with b held, from ψ to ψ.
 
@@ -190,7 +201,7 @@ def held_gains(amplitude: float, held: float, start: float, end: float) -> tuple
 
 
 @scalar
-def integrate_eq4(batch: Batch, side: float, g: float) -> None:
+def integrate_eq4(batch: Batch, is_short: bool, side: float, g: float) -> None:
     """Set `gain` and `moment` to the gains of V and W from rest by Eq. 4, from `start` to `end`.
 
     These are ∫ D dψ and ∫ (end − ψ) D dψ, with
@@ -202,9 +213,9 @@ def integrate_eq4(batch: Batch, side: float, g: float) -> None:
     """
     for j in range(WIDTH):
         batch.gain[j] = batch.moment[j] = 0.0
-    for node in range(NODES.size):
-        at = NODES[node]
-        weight = WEIGHTS[node]
+    for node in range(SHORT_NODES.size if is_short else NODES.size):
+        at = SHORT_NODES[node] if is_short else NODES[node]
+        weight = SHORT_WEIGHTS[node] if is_short else WEIGHTS[node]
         for j in range(WIDTH):
             psi = batch.start[j] + (batch.end[j] - batch.start[j]) * at
             x = side * (batch.amplitude[j] * (1.0 - versine(psi)))

@@ -3,30 +3,36 @@
 docs/numerics.md#batches-of-the-sine
 """
 
-import numpy as np
+import math
 
 from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.jit.elementary import rising_phase
 from slipsweep.kernels.block import MONOTONE, NEWMARK, Options, decay_rate_of, interface_of
 from slipsweep.kernels.sine.batch import (
     MOST_E_FOLDINGS,
-    SLIDING_MODE,
-    VALIDITY,
+    SHORT,
     WIDTH,
     Batch,
     cell_of,
     relative_acceleration,
+    static_acceleration,
 )
 from slipsweep.model import equations as eq
 from slipsweep.model.equations import CONTINUOUS, STICK_SLIP, STUCK
 
 #: Kinds of motion that batches are made of: from Üg = Üy to the peak b = Üy throughout (Newmark's
-#: block, too), or b = Üy and then Eq. 4, or at rest until Eq. 4 falls below Üg; Eq. 4 all the time;
-#: and all others of stick-slip and of continuous sliding, solved one by one (`alone`).
-STAYS_AT_YIELD, FOLLOWS_EQ4, STICKS_AT_YIELD, SLIDES_ON, SLIPS_ALONE, SLIDES_ALONE = range(6)
-KINDS = 6
+#: block, too), or b = Üy and then Eq. 4, or at rest until Eq. 4 falls below Üg; Eq. 4 all the time,
+#: with μ = μs early on the rise or late.  Then all others of stick-slip and of continuous sliding,
+#: solved one by one (`alone`).
+STAYS_AT_YIELD, FOLLOWS_EQ4, STICKS_AT_YIELD, SLIDES_ON, SLIDES_ON_LATE = range(5)
+SLIPS_ALONE = 5
+SLIDES_ALONE = 6
+KINDS = 7
 #: No motion: stuck, without a value, or as Eq. 4 does not fall below Üg.
-RESTS = 6
+RESTS = 7
+
+#: |Üg| over the amplitude up to which parts of continuous sliding are short.
+_EARLY = math.sin(SHORT)
 
 
 @inlined
@@ -74,48 +80,77 @@ def stays_with_base(batch: Batch, j: int, g: float) -> bool:
 
 
 @scalar
-def classify(batch: Batch, first: int, options: Options, results: np.ndarray) -> None:
-    """Set the block of each cell of a batch and the kind of its motion.
+def classify(batch: Batch, options: Options) -> None:
+    """Set the block of each cell of a batch, its mode and flags, and the kind of its motion.
 
-    The mode and the validity that is known before the motion go into the results.
+    Neighbours are mostly alike: what none of the cells needs is not computed.
     """
     g = options.g
     slides = 0
+    pulses = 0
     for j in range(WIDTH):
         interface = interface_of(cell_of(batch, j), options.rise, g)
         batch.yield_acceleration[j] = interface.yield_acceleration
         batch.delta_mu[j] = interface.delta_mu
         batch.minimum_friction[j] = interface.minimum_friction
         batch.sliding_mode[j] = interface.sliding_mode
-        batch.validity[j] = interface.validity
+        batch.validity_before[j] = interface.validity
         batch.kind[j] = RESTS
         slides += 1 if interface.sliding_mode > STUCK else 0
-    for j in range(batch.used):
-        results[SLIDING_MODE, first + j] = batch.sliding_mode[j]
-        results[VALIDITY, first + j] = batch.validity[j]
+        pulses += 1 if interface.sliding_mode == STICK_SLIP else 0
     if slides == 0:
         return
     for j in range(WIDTH):
-        batch.decay_rate[j] = decay_rate_of(
-            cell_of(batch, j), batch.delta_mu[j], batch.minimum_friction[j], g
-        )
         batch.yield_phase[j] = rising_phase(batch.yield_acceleration[j], batch.amplitude[j])
     if options.rise == NEWMARK:
         for j in range(WIDTH):
             batch.kind[j] = STAYS_AT_YIELD if batch.sliding_mode[j] == STICK_SLIP else RESTS
         return
     for j in range(WIDTH):
-        start = batch.yield_acceleration[j]
-        end = batch.amplitude[j]
-        batch.response_at_yield[j] = start - relative_acceleration(batch, j, start, g)[0]
-        batch.response_at_peak[j] = end - relative_acceleration(batch, j, end, g)[0]
-    for j in range(WIDTH):
-        if batch.sliding_mode[j] == STICK_SLIP:
-            kind = pulse_kind(batch, j, g) if options.rise == MONOTONE else SLIPS_ALONE
-            batch.kind[j] = RESTS if stays_with_base(batch, j, g) else kind
-        elif batch.sliding_mode[j] == CONTINUOUS:
+        batch.decay_rate[j] = decay_rate_of(
+            cell_of(batch, j), batch.delta_mu[j], batch.minimum_friction[j], g
+        )
+    if pulses > 0:
+        classify_pulses(batch, options)
+    if slides > pulses:
+        for j in range(WIDTH):
             gentle = batch.decay_rate[j] * batch.amplitude[j] <= MOST_E_FOLDINGS * g
             # for the peak velocity D has to be concave (`continuous`)
             concave = batch.decay_rate[j] >= 2.0 * batch.tan_theta[j]
             together = gentle & (concave | (not options.wants_peak))
-            batch.kind[j] = SLIDES_ON if together else SLIDES_ALONE
+            # where the integrals end: at Üy, and for the peak velocity where D = 0
+            longest = static_acceleration(batch, j, g) if options.wants_peak else 0.0
+            longest = max(longest, batch.yield_acceleration[j])
+            kind = SLIDES_ON if longest <= _EARLY * batch.amplitude[j] else SLIDES_ON_LATE
+            kind = kind if together else SLIDES_ALONE
+            batch.kind[j] = kind if batch.sliding_mode[j] == CONTINUOUS else batch.kind[j]
+
+
+@scalar
+def classify_pulses(batch: Batch, options: Options) -> None:
+    """Set the kind of the cells in stick-slip."""
+    g = options.g
+    lagging = 0
+    for j in range(WIDTH):
+        start = batch.yield_acceleration[j]
+        end = batch.amplitude[j]
+        batch.response_at_yield[j] = start - relative_acceleration(batch, j, start, g)[0]
+        batch.response_at_peak[j] = end - relative_acceleration(batch, j, end, g)[0]
+        pulses = batch.sliding_mode[j] == STICK_SLIP
+        kind = pulse_kind(batch, j, g) if options.rise == MONOTONE else SLIPS_ALONE
+        batch.kind[j] = kind if pulses else batch.kind[j]
+        lagging += 1 if pulses & (batch.response_at_peak[j] >= end) else 0
+    if lagging > 0:
+        for j in range(WIDTH):
+            pulses = batch.sliding_mode[j] == STICK_SLIP
+            rests = pulses & stays_with_base(batch, j, g)
+            batch.kind[j] = RESTS if rests else batch.kind[j]
+
+
+@scalar
+def take_alone(batch: Batch) -> None:
+    """Let the cells that move be solved one by one."""
+    for j in range(WIDTH):
+        slides_on = batch.sliding_mode[j] == CONTINUOUS
+        kind = SLIDES_ALONE if slides_on else SLIPS_ALONE
+        batch.kind[j] = RESTS if batch.kind[j] == RESTS else kind

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from slipsweep.jit.compiling import kernel
-from slipsweep.jit.decorators import inlined, scalar, single
+from slipsweep.jit.decorators import inlined, scalar
 from slipsweep.kernels.block import (
     NEWMARK,
     NO_VALUE,
@@ -33,7 +33,7 @@ from slipsweep.kernels.sine.continuous import (
     slide_through_quarter,
 )
 from slipsweep.kernels.sine.pulse import begin_to_slide, fall, repeat, rise
-from slipsweep.model.equations import CONTINUOUS, STUCK
+from slipsweep.model.equations import CONTINUOUS, STICK_SLIP, STUCK
 
 
 @inlined
@@ -48,32 +48,59 @@ def append(source: Batch, j: int, cell: int, target: Batch) -> None:
     target.delta_mu[k] = source.delta_mu[j]
     target.decay_rate[k] = source.decay_rate[j]
     target.yield_phase[k] = source.yield_phase[j]
+    target.validity_before[k] = source.validity_before[j]
     target.used = k + 1
 
 
 @scalar
-def store(batch: Batch, k: int, kind: int, options: Options, results: np.ndarray) -> None:
-    """Write the results of cell k of a batch."""
-    cell = batch.cell[k]
-    displacement = batch.displacement[k]
-    if batch.solved[k] == 0.0 or math.isnan(displacement):  # where sums overflow
-        results[VALIDITY, cell] = UNSOLVED
-        return
-    validity = int(results[VALIDITY, cell]) | int(batch.validity[k])
-    if kind == kinds.STAYS_AT_YIELD and options.rise != NEWMARK:
-        validity |= YIELD_GOVERNS
-    validity = settled(without_estimates(validity), displacement, batch.amplitude[k])
-    valueless = validity & NO_VALUE != 0
-    results[DISPLACEMENT, cell] = math.nan if valueless else displacement
-    results[PEAK_VELOCITY, cell] = math.nan if valueless else batch.peak_velocity[k]
-    results[SLIDING_MODE, cell] = -1.0 if valueless else results[SLIDING_MODE, cell]
-    results[VALIDITY, cell] = validity
+def store(batch: Batch, used: int, kind: int, options: Options, results: np.ndarray) -> None:
+    """Write the results of the first cells of a batch."""
+    mode = STICK_SLIP if kind < kinds.SLIDES_ON or kind == kinds.SLIPS_ALONE else CONTINUOUS
+    governs = kind == kinds.STAYS_AT_YIELD and options.rise != NEWMARK
+    of_the_kind = YIELD_GOVERNS if governs else 0
+    for j in range(WIDTH):
+        displacement = batch.displacement[j]
+        validity = int(batch.validity_before[j]) | int(batch.validity[j]) | of_the_kind
+        validity = settled(without_estimates(validity), displacement, batch.amplitude[j])
+        valueless = validity & NO_VALUE != 0
+        batch.displacement[j] = math.nan if valueless else displacement
+        batch.peak_velocity[j] = math.nan if valueless else batch.peak_velocity[j]
+        batch.sliding_mode[j] = -1.0 if valueless else mode
+        # where sums overflow W is no number, either
+        is_solved = (batch.solved[j] > 0.0) & (not math.isnan(displacement))
+        batch.validity[j] = validity if is_solved else UNSOLVED
+    for j in range(used):
+        cell = batch.cell[j]
+        results[DISPLACEMENT, cell] = batch.displacement[j]
+        results[PEAK_VELOCITY, cell] = batch.peak_velocity[j]
+        results[SLIDING_MODE, cell] = batch.sliding_mode[j]
+        results[VALIDITY, cell] = batch.validity[j]
 
 
-@single
+@scalar
+def store_at_rest(batch: Batch, j: int, cell: int, results: np.ndarray) -> None:
+    """Write the results of a cell that is stuck, or that has no value."""
+    at_rest = 0.0 if batch.sliding_mode[j] >= STUCK else math.nan
+    results[DISPLACEMENT, cell] = at_rest
+    results[PEAK_VELOCITY, cell] = at_rest
+    results[SLIDING_MODE, cell] = batch.sliding_mode[j]
+    results[VALIDITY, cell] = batch.validity_before[j]
+
+
+@inlined
+def common_kind(batch: Batch) -> int:
+    """Return the kind of all cells of a full batch; `RESTS` if they are of several."""
+    kind = batch.kind[0]
+    others = WIDTH - batch.used
+    for j in range(WIDTH):
+        others += 1 if batch.kind[j] != kind else 0
+    return kind if others == 0 else kinds.RESTS
+
+
+@scalar
 def solve_batch(batch: Batch, kind: int, options: Options, results: np.ndarray) -> None:
-    """Solve the first cells of one kind, store their results, and leave the others in the batch."""
-    used = batch.used if batch.used < WIDTH else WIDTH
+    """Solve the cells of one kind in a batch, store their results, and empty the batch."""
+    used = batch.used
     for k in range(used, WIDTH):
         append(batch, k - used, batch.cell[k - used], batch)
     if kind == kinds.SLIPS_ALONE:
@@ -88,16 +115,13 @@ def solve_batch(batch: Batch, kind: int, options: Options, results: np.ndarray) 
             for j in range(used):
                 slide_alone(batch, j, options)
         else:
-            slide_through_quarter(batch, options.g)
+            is_short = kind == kinds.SLIDES_ON
+            slide_through_quarter(batch, is_short, options.g)
             if options.wants_peak:
-                find_highest(batch, options.g)
+                find_highest(batch, is_short, options.g)
         slide_through_cycles(batch, options)
-    for k in range(used):
-        store(batch, k, kind, options, results)
-    waiting = batch.used - WIDTH
+    store(batch, used, kind, options, results)
     batch.used = 0
-    for k in range(WIDTH, WIDTH + waiting):
-        append(batch, k, batch.cell[k], batch)
 
 
 @kernel
@@ -114,24 +138,23 @@ def solve_sine(cells: np.ndarray, options: Options, alone: bool, results: np.nda
     loaded = batches[kinds.KINDS]
     for first in range(0, cells.size, WIDTH):
         load(cells, first, loaded)
-        kinds.classify(loaded, first, options, results)
+        kinds.classify(loaded, options)
+        if alone:
+            kinds.take_alone(loaded)
+        kind = common_kind(loaded)
+        if kind < kinds.KINDS:
+            for j in range(WIDTH):
+                loaded.cell[j] = first + j
+            solve_batch(loaded, kind, options, results)
+            continue
         for j in range(loaded.used):
             kind = loaded.kind[j]
-            cell = first + j
             if kind == kinds.RESTS:
-                at_rest = 0.0 if loaded.sliding_mode[j] >= STUCK else math.nan
-                results[DISPLACEMENT, cell] = at_rest
-                results[PEAK_VELOCITY, cell] = at_rest
+                store_at_rest(loaded, j, first + j, results)
                 continue
-            if alone:
-                slides_on = loaded.sliding_mode[j] == CONTINUOUS
-                kind = kinds.SLIDES_ALONE if slides_on else kinds.SLIPS_ALONE
-            elif kind >= kinds.SLIPS_ALONE:
-                results[VALIDITY, cell] = UNSOLVED
-                continue
-            append(loaded, j, cell, batches[kind])
-        # when no more are to come, batches need not be full
-        needed = WIDTH if first + WIDTH < cells.size else 1
-        for kind in range(kinds.KINDS):
-            while batches[kind].used >= needed:
+            append(loaded, j, first + j, batches[kind])
+            if batches[kind].used == WIDTH:
                 solve_batch(batches[kind], kind, options, results)
+    for kind in range(kinds.KINDS):
+        if batches[kind].used > 0:
+            solve_batch(batches[kind], kind, options, results)
