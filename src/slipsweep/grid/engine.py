@@ -323,7 +323,6 @@ def _fill_tile(
                 f"{_inputs_at(is_unsolved, problem, inputs)}: an event of the motion was not "
                 "found; please report this cell, with the options of the run"
             )
-        has_value = validity & np.int16(variables.VALUELESS) == 0
         seconds = phase_seconds(problem, inputs)
         for name, target in results.items():
             in_phase = rows[solver.rows[name]].reshape(shape)
@@ -331,9 +330,11 @@ def _fill_tile(
             np.multiply(in_phase, factor, out=target, casting="unsafe")
             if not finite or target.dtype.kind != "f":
                 continue
-            largest = np.abs(in_phase[has_value]).max(initial=0.0) * factor.max()
-            if math.isfinite(largest):  # quicker than a look at all results
+            # quicker than a look at all results; a cell without a value has NaN
+            largest = np.fmax.reduce(np.abs(in_phase), axis=None, initial=0.0) * factor.max()
+            if math.isfinite(largest):
                 continue
+            has_value = validity & np.int16(variables.VALUELESS) == 0
             is_infinite = has_value & ~np.isfinite(target)
             if is_infinite.any():
                 raise InputError(

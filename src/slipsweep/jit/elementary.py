@@ -60,16 +60,11 @@ _LOG = tuple(2.0 / power for power in range(3, 23, 2))
 
 @single
 def _polynomial(x: float, coefficients: tuple[float, ...]) -> float:
-    """Σ cₖ xᵏ; even and odd powers are summed beside each other, which takes less time."""
-    square = x * x
-    even = 0.0
-    odd = 0.0
-    last = len(coefficients) - 1
-    for k in range(last - last % 2, -1, -2):
-        even = even * square + coefficients[k]
-    for k in range(last - (last + 1) % 2, -1, -2):
-        odd = odd * square + coefficients[k]
-    return odd * x + even
+    """Σ cₖ xᵏ."""
+    total = 0.0
+    for k in range(len(coefficients) - 1, -1, -1):
+        total = total * x + coefficients[k]
+    return total
 
 
 @elementary

@@ -22,34 +22,18 @@ from slipsweep.motion.paths import Curve, Piece
 
 
 @inlined
-def last_pair(piece: Piece) -> int:
-    """Return the even place at which the last two coefficients of a curve begin.
-
-    Even and odd powers are summed beside each other, which takes less time than one after another.
-    """
-    return (piece.degree - 1) & ~1
-
-
-@inlined
 def from_top(piece: Piece, curve: Curve, tau: float) -> tuple[float, float]:
     """Return w − top and dw/dτ."""
     if piece.degree <= 1:
         return piece.slope * tau, piece.slope
     if piece.arc:
         return -piece.top * versine(tau), -piece.top * math.sin(tau)
-    # Σ cₖ τᵏ⁺¹ = τ (E + τ O), each a sum of powers of τ²
-    square = tau * tau
-    even = 0.0
-    odd = 0.0
-    even_slope = 0.0
-    odd_slope = 0.0
-    for k in range(last_pair(piece), -1, -2):
-        even_slope = even_slope * square + even
-        odd_slope = odd_slope * square + odd
-        even = even * square + curve.coefficients[k]
-        odd = odd * square + curve.coefficients[k + 1]
-    slope = even + 2.0 * tau * (odd + tau * even_slope + square * odd_slope)
-    return tau * (even + tau * odd), slope
+    value = 0.0
+    slope = 0.0
+    for k in range(piece.degree - 1, -1, -1):
+        slope = slope * tau + value
+        value = value * tau + curve.coefficients[k]
+    return value * tau, slope * tau + value
 
 
 @scalar
@@ -99,27 +83,22 @@ def offset_at(piece: Piece, curve: Curve, amplitude: float, x: float) -> float:
 
 
 @inlined
-def integrals_from_anchor(piece: Piece, curve: Curve, tau: float) -> tuple[float, float]:
-    """Return ∫ (w − top) and its integral, from the anchor of a curve to τ, by Taylor series."""
-    square = tau * tau
-    once_even = 0.0
-    once_odd = 0.0
-    twice_even = 0.0
-    twice_odd = 0.0
-    for k in range(last_pair(piece), -1, -2):
-        once_even = once_even * square + curve.once[k]
-        once_odd = once_odd * square + curve.once[k + 1]
-        twice_even = twice_even * square + curve.twice[k]
-        twice_odd = twice_odd * square + curve.twice[k + 1]
-    return (once_even + tau * once_odd) * square, (twice_even + tau * twice_odd) * square * tau
-
-
-@inlined
-def moments(piece: Piece, curve: Curve, start: float, end: float) -> tuple[float, float]:
-    """Return ∫ (w − top) dτ and ∫ (end − τ)(w − top) dτ on a curved piece."""
-    once_start, twice_start = integrals_from_anchor(piece, curve, start)
-    once_end, twice_end = integrals_from_anchor(piece, curve, end)
-    return once_end - once_start, twice_end - twice_start - once_start * (end - start)
+def moments(curve: Curve, degree: int, start: float, end: float) -> tuple[float, float]:
+    """Return ∫ (w − top) dτ and ∫ (end − τ)(w − top) dτ on a curved piece, by its Taylor series."""
+    once_start = 0.0
+    once_end = 0.0
+    twice_start = 0.0
+    twice_end = 0.0
+    for k in range(degree - 1, -1, -1):
+        once = curve.once[k]
+        twice = curve.twice[k]
+        once_start = once_start * start + once
+        once_end = once_end * end + once
+        twice_start = twice_start * start + twice
+        twice_end = twice_end * end + twice
+    once_start *= start * start
+    second = twice_end * end * end * end - twice_start * start * start * start
+    return once_end * end * end - once_start, second - once_start * (end - start)
 
 
 @scalar
@@ -146,6 +125,6 @@ def held_gains(
         first = -piece.top * (angle_minus_sine(end) - before)
         second = -piece.top * (whole - before * width)
     else:
-        first, second = moments(piece, curve, start, end)
+        first, second = moments(curve, piece.degree, start, end)
     excess = amplitude * piece.top - held
     return excess * width + amplitude * first, 0.5 * excess * width * width + amplitude * second

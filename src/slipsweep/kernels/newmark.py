@@ -111,7 +111,7 @@ def gains(
         slope = scale * piece.slope
         gained = (excess + 0.5 * slope * (start + end)) * width
         return gained, (0.5 * excess + slope * (2.0 * start + end) / 6.0) * width * width
-    first, second = moments(piece, curve, start, end)
+    first, second = moments(curve, piece.degree, start, end)
     return excess * width + scale * first, 0.5 * excess * width * width + scale * second
 
 

@@ -18,9 +18,12 @@ from slipsweep.model import equations as eq
 from slipsweep.model.friction import exponential_derivatives
 
 #: Cells of a batch.  Its iterations end with that of the slowest cell.
-WIDTH = 32
+WIDTH = 64
 
 HALF_PI = 0.5 * math.pi
+
+#: Cells that a batch has room for: those of a batch and those that wait for the next one.
+ROOM = 2 * WIDTH
 
 #: The block of a cell (`kernels.block`), ψ at which Üg = Üy, and the flags known before the motion.
 BLOCK = (
@@ -85,13 +88,16 @@ MOST_PLACES = 16
 BATCH = np.dtype(
     (
         np.record,
-        [(name, np.float64, (WIDTH,)) for name in (*BLOCK, *QUANTITIES)]
+        [(name, np.float64, (ROOM,)) for name in BLOCK]
+        + [(name, np.float64, (WIDTH,)) for name in QUANTITIES]
         # the number of the cell in the results, the kind of its motion (`kinds`), the number of
-        # cells; the places of each cell: Üg, ψ, E, and if D > 0 from there to the next
+        # cells; if Eq. 4 is integrated by the rule of short parts; the places of each cell: Üg,
+        # ψ, E, and if D > 0 from there to the next
         + [
-            ("cell", np.int64, (WIDTH,)),
+            ("cell", np.int64, (ROOM,)),
             ("kind", np.int64, (WIDTH,)),
             ("used", np.int64),
+            ("is_short", np.bool_),
             ("places", np.float64, (WIDTH, MOST_PLACES)),
             ("phases", np.float64, (WIDTH, MOST_PLACES)),
             ("responses", np.float64, (WIDTH, MOST_PLACES)),
@@ -133,6 +139,7 @@ def load(cells: np.ndarray, first: int, batch: Batch) -> None:
     rest = cells.size - first
     batch.used = rest if rest < WIDTH else WIDTH
     for j in range(batch.used):
+        batch.cell[j] = first + j
         batch.tan_theta[j] = cells[first + j].tan_theta
         batch.mu_s[j] = cells[first + j].mu_s
         batch.amplitude[j] = cells[first + j].amplitude
@@ -201,7 +208,7 @@ def held_gains(amplitude: float, held: float, start: float, end: float) -> tuple
 
 
 @scalar
-def integrate_eq4(batch: Batch, is_short: bool, side: float, g: float) -> None:
+def integrate_eq4(batch: Batch, side: float, g: float) -> None:
     """Set `gain` and `moment` to the gains of V and W from rest by Eq. 4, from `start` to `end`.
 
     These are ∫ D dψ and ∫ (end − ψ) D dψ, with
@@ -213,6 +220,7 @@ def integrate_eq4(batch: Batch, is_short: bool, side: float, g: float) -> None:
     """
     for j in range(WIDTH):
         batch.gain[j] = batch.moment[j] = 0.0
+    is_short = batch.is_short
     for node in range(SHORT_NODES.size if is_short else NODES.size):
         at = SHORT_NODES[node] if is_short else NODES[node]
         weight = SHORT_WEIGHTS[node] if is_short else WEIGHTS[node]

@@ -49,7 +49,7 @@ def quarter_integrals(k: float) -> tuple[float, float]:
 
 
 @scalar
-def slide_through_quarter(batch: Batch, is_short: bool, g: float) -> None:
+def slide_through_quarter(batch: Batch, g: float) -> None:
     """Set the gains by Eq. 4 over a quarter (`quarter`), a cycle (`drift`), and up to Üg = Üy.
 
     Over a rising quarter of the cycle let q₀ = ∫ e^(−k sin φ) dφ, q₁ = ∫ sin φ e^(−k sin φ) dφ, k =
@@ -74,14 +74,14 @@ def slide_through_quarter(batch: Batch, is_short: bool, g: float) -> None:
         batch.end[j] = batch.yield_phase[j]
         batch.validity[j] = 0.0
         batch.solved[j] = 1.0
-    integrate_eq4(batch, is_short, 1.0, g)
+    integrate_eq4(batch, 1.0, g)
     for j in range(WIDTH):
         batch.velocity[j] = batch.gain[j]
         batch.displacement[j] = batch.moment[j]
 
 
 @scalar
-def find_highest(batch: Batch, is_short: bool, g: float) -> None:
+def find_highest(batch: Batch, g: float) -> None:
     """Set the largest V of each half cycle that is entered with V = 0 (`highest_of_…`).
 
     V is largest where D changes its sign, or at an end of the half cycle.  D is ∓ g Δμ at Üg = 0.
@@ -105,7 +105,7 @@ def find_highest(batch: Batch, is_short: bool, g: float) -> None:
         for j in range(WIDTH):
             batch.solved[j] = min(batch.solved[j], batch.converged[j])
             batch.end[j] = rising_phase(batch.event[j], batch.amplitude[j])
-        integrate_eq4(batch, is_short, side, g)
+        integrate_eq4(batch, side, g)
         for j in range(WIDTH):
             turn = batch.gain[j]
             positive = 2.0 * batch.quarter[j]

@@ -5,7 +5,7 @@ docs/numerics.md#batches-of-the-sine
 
 import math
 
-from slipsweep.jit.decorators import inlined, scalar
+from slipsweep.jit.decorators import inlined, scalar, single
 from slipsweep.jit.elementary import rising_phase
 from slipsweep.kernels.block import MONOTONE, NEWMARK, Options, decay_rate_of, interface_of
 from slipsweep.kernels.sine.batch import (
@@ -126,7 +126,7 @@ def classify(batch: Batch, options: Options) -> None:
             batch.kind[j] = kind if batch.sliding_mode[j] == CONTINUOUS else batch.kind[j]
 
 
-@scalar
+@single
 def classify_pulses(batch: Batch, options: Options) -> None:
     """Set the kind of the cells in stick-slip."""
     g = options.g
@@ -145,12 +145,3 @@ def classify_pulses(batch: Batch, options: Options) -> None:
             pulses = batch.sliding_mode[j] == STICK_SLIP
             rests = pulses & stays_with_base(batch, j, g)
             batch.kind[j] = RESTS if rests else batch.kind[j]
-
-
-@scalar
-def take_alone(batch: Batch) -> None:
-    """Let the cells that move be solved one by one."""
-    for j in range(WIDTH):
-        slides_on = batch.sliding_mode[j] == CONTINUOUS
-        kind = SLIDES_ALONE if slides_on else SLIPS_ALONE
-        batch.kind[j] = RESTS if batch.kind[j] == RESTS else kind

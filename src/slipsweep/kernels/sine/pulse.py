@@ -132,7 +132,7 @@ def rise(batch: Batch, kind: int, g: float) -> None:
         batch.velocity[j], batch.displacement[j] = gained
         batch.start[j] = switch
         batch.end[j] = 0.0
-    integrate_eq4(batch, False, 1.0, g)
+    integrate_eq4(batch, 1.0, g)
     for j in range(WIDTH):
         batch.displacement[j] += batch.moment[j] - batch.velocity[j] * batch.start[j]
         batch.velocity[j] += batch.gain[j]

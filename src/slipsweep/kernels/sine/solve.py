@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from slipsweep.jit.compiling import kernel
-from slipsweep.jit.decorators import inlined, scalar
+from slipsweep.jit.decorators import inlined, scalar, single
 from slipsweep.kernels.block import (
     NEWMARK,
     NO_VALUE,
@@ -78,16 +78,6 @@ def store(batch: Batch, used: int, kind: int, options: Options, results: np.ndar
 
 
 @scalar
-def store_at_rest(batch: Batch, j: int, cell: int, results: np.ndarray) -> None:
-    """Write the results of a cell that is stuck, or that has no value."""
-    at_rest = 0.0 if batch.sliding_mode[j] >= STUCK else math.nan
-    results[DISPLACEMENT, cell] = at_rest
-    results[PEAK_VELOCITY, cell] = at_rest
-    results[SLIDING_MODE, cell] = batch.sliding_mode[j]
-    results[VALIDITY, cell] = batch.validity_before[j]
-
-
-@inlined
 def common_kind(batch: Batch) -> int:
     """Return the kind of all cells of a full batch; `RESTS` if they are of several."""
     kind = batch.kind[0]
@@ -97,12 +87,41 @@ def common_kind(batch: Batch) -> int:
     return kind if others == 0 else kinds.RESTS
 
 
+@single
+def distribute(loaded: Batch, batches: np.ndarray, alone: bool, results: np.ndarray) -> None:
+    """Append the cells of a batch to those of their kinds, or to be solved `alone`."""
+    for j in range(loaded.used):
+        kind = loaded.kind[j]
+        cell = loaded.cell[j]
+        if kind == kinds.RESTS:
+            at_rest = 0.0 if loaded.sliding_mode[j] >= STUCK else math.nan
+            results[DISPLACEMENT, cell] = at_rest
+            results[PEAK_VELOCITY, cell] = at_rest
+            results[SLIDING_MODE, cell] = loaded.sliding_mode[j]
+            results[VALIDITY, cell] = loaded.validity_before[j]
+            continue
+        if alone:
+            slides_on = loaded.sliding_mode[j] == CONTINUOUS
+            kind = kinds.SLIDES_ALONE if slides_on else kinds.SLIPS_ALONE
+        append(loaded, j, cell, batches[kind])
+
+
 @scalar
+def ready_kind(batches: np.ndarray, needed: int) -> int:
+    """Return the first kind of which as many cells wait as are needed; `RESTS` if none do."""
+    for kind in range(kinds.KINDS):
+        if batches[kind].used >= needed:
+            return kind
+    return kinds.RESTS
+
+
+@single
 def solve_batch(batch: Batch, kind: int, options: Options, results: np.ndarray) -> None:
-    """Solve the cells of one kind in a batch, store their results, and empty the batch."""
-    used = batch.used
+    """Solve the first cells of one kind, store their results, and leave the others in the batch."""
+    used = batch.used if batch.used < WIDTH else WIDTH
     for k in range(used, WIDTH):
         append(batch, k - used, batch.cell[k - used], batch)
+    batch.is_short = kind == kinds.SLIDES_ON
     if kind == kinds.SLIPS_ALONE:
         slip_alone(batch, used, options)
     elif kind < kinds.SLIDES_ON:
@@ -115,21 +134,23 @@ def solve_batch(batch: Batch, kind: int, options: Options, results: np.ndarray) 
             for j in range(used):
                 slide_alone(batch, j, options)
         else:
-            is_short = kind == kinds.SLIDES_ON
-            slide_through_quarter(batch, is_short, options.g)
+            slide_through_quarter(batch, options.g)
             if options.wants_peak:
-                find_highest(batch, is_short, options.g)
+                find_highest(batch, options.g)
         slide_through_cycles(batch, options)
     store(batch, used, kind, options, results)
+    waiting = batch.used - WIDTH
     batch.used = 0
+    for k in range(WIDTH, WIDTH + waiting):
+        append(batch, k, batch.cell[k], batch)
 
 
 @kernel
 def solve_sine(cells: np.ndarray, options: Options, alone: bool, results: np.ndarray) -> None:
     """Solve cells under a sine into W, V, mode and validity, the first rows of `results`.
 
-    `results` is (fields of `Motion`, cells).  Where the validity is then `UNSOLVED` a cell is of no
-    kind that is solved in SIMD, and has to be solved `alone`.
+    `results` is (fields of `Motion`, cells).  Where the validity is then `UNSOLVED` a batch has not
+    found an event, and the cell has to be solved `alone`.
     """
     # zeros: a NaN in a lane that a kind does not set would keep its iterations from ending
     batches = np.zeros(kinds.KINDS + 1, BATCH)
@@ -139,22 +160,16 @@ def solve_sine(cells: np.ndarray, options: Options, alone: bool, results: np.nda
     for first in range(0, cells.size, WIDTH):
         load(cells, first, loaded)
         kinds.classify(loaded, options)
-        if alone:
-            kinds.take_alone(loaded)
-        kind = common_kind(loaded)
-        if kind < kinds.KINDS:
-            for j in range(WIDTH):
-                loaded.cell[j] = first + j
-            solve_batch(loaded, kind, options, results)
-            continue
-        for j in range(loaded.used):
-            kind = loaded.kind[j]
-            if kind == kinds.RESTS:
-                store_at_rest(loaded, j, first + j, results)
-                continue
-            append(loaded, j, first + j, batches[kind])
-            if batches[kind].used == WIDTH:
-                solve_batch(batches[kind], kind, options, results)
-    for kind in range(kinds.KINDS):
-        if batches[kind].used > 0:
-            solve_batch(batches[kind], kind, options, results)
+        # along an axis of a sweep neighbours are mostly of one kind: they are solved where they are
+        batch = loaded
+        kind = kinds.RESTS if alone else common_kind(loaded)
+        # when no more are to come, batches need not be full
+        needed = WIDTH if first + WIDTH < cells.size else 1
+        if kind == kinds.RESTS:
+            distribute(loaded, batches, alone, results)
+            kind = ready_kind(batches, needed)
+            batch = batches[kind]
+        while kind < kinds.KINDS:
+            solve_batch(batch, kind, options, results)
+            kind = ready_kind(batches, needed)
+            batch = batches[kind]
