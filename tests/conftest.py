@@ -4,6 +4,7 @@ import gc
 import os
 import signal
 import sys
+from collections import Counter
 from collections.abc import Iterator
 
 import pytest
@@ -29,6 +30,16 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+#: Files whose tests take long, each for itself.
+LONG = {"test_readme.py", "test_calibration.py", "test_extremes.py", "test_benchmarks.py"}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with long files, then go on with those of most tests: so all processes end together."""
+    counts = Counter(item.path for item in items)
+    items.sort(key=lambda item: (item.path.name not in LONG, -counts[item.path]))
+
+
 @pytest.fixture(autouse=True, scope="session")
 def _no_power_cut() -> Iterator[None]:
     """Do not wait for the disk, which takes minutes on a slow one; processes of tests do wait."""
@@ -37,6 +48,22 @@ def _no_power_cut() -> Iterator[None]:
         yield
     # pytest ends by collecting garbage five times, for warnings of what is deleted: seconds
     gc.freeze()
+
+
+#: What each process of the suite does first, to compile kernels that most tests need.
+FIRST = {
+    "gw0": ({}, {"model": "newmark", "excitation": "square"}),
+    "gw1": ({"excitation": "square"}, {"solver": "step"}),
+}
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _no_waiting_for_kernels(worker_id: str) -> None:
+    """Compile different kernels in different processes, which would wait for one another."""
+    import slipsweep  # here: the settings above come first
+
+    for options in FIRST.get(worker_id, ()):
+        slipsweep.sweep(theta=5.0, mu_s=0.4, amplitude=5.0, frequency=1.0, **options)
 
 
 @pytest.fixture

@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -47,6 +48,31 @@ PARAMETERS = """
 import slipsweep
 found = slipsweep.friction_parameters(5.0, 0.38, 3.55, yield_acceleration=0.59)
 print(round(float(found.limiting_acceleration), 3))
+"""
+
+
+#: Calls each kernel of the package, and prints which were compiled.
+ALL = """
+from slipsweep import Newmark, Record, Step, friction_parameters, simulate, sweep
+from slipsweep.jit import compiling
+names = []
+compiling.announce = names.append
+record = Record.sampled([0.0, 5.0, -5.0, 0.0], 0.1)
+block = {"theta": 5.0, "mu_s": 0.4, "amplitude": 5.0, "frequency": 1.0}
+shaken = {"theta": 5.0, "mu_s": 0.4, "excitation": record}
+weakening = Newmark(strength="weakening")
+rate = Newmark(strength="rate")
+friction_parameters(5.0, 0.4, 5.0)
+sweep(**block)
+sweep(**shaken)
+sweep(**shaken, model="newmark")
+sweep(**block, excitation="triangle", model="newmark")
+simulate(**block, model="newmark")
+sweep(**block, solver="step")
+sweep(**block, solver="step", model="newmark")
+sweep(**block, solver="step", model=weakening, residual_mu=0.3, weakening_distance=0.1)
+sweep(**block, solver="step", model=rate, fast_mu=0.3, rate_constant=10.0)
+print(*names)
 """
 
 
@@ -136,6 +162,18 @@ def test_of_five_processes_that_start_at_once_one_compiles_also_where_two_are_ki
     assert [float(value) for value, _ in outputs] == pytest.approx([TOTAL] * 3)
     assert sum(compiled == "True" for _, compiled in outputs) <= 1
     assert run(ONE, env, str(tmp_path)).endswith("False"), "it is kept"
+
+
+def test_a_later_process_compiles_no_kernel() -> None:
+    sources = "".join(path.read_text("utf-8") for path in PACKAGE.rglob("*.py"))
+    kernels = set(re.findall(r"^@kernel\ndef (\w+)", sources, re.MULTILINE))
+    env = dict(os.environ)
+    run(ALL, env)
+    assert run(ALL, env) == ""
+    kept = {
+        path.name.split("-")[0].split(".")[-1] for path in compiling.cache_folder().rglob("*.nbc")
+    }
+    assert kernels <= kept
 
 
 def test_a_changed_equation_is_never_served_from_an_old_cache(tmp_path: Path) -> None:

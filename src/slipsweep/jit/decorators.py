@@ -53,3 +53,9 @@ equation: Callable[[_Function], _Function] = numba.extending.register_jitable(
     nogil=True, error_model="numpy", fastmath={"contract", "arcp"}, forceinline=True, **_INTERNAL
 )
 registered = equation
+
+#: The same for a long function, which is not inlined.  A kernel that has a compiled function, like
+#: `scalar`, for a value is not kept on disk: numba would have to keep its address.
+as_value: Callable[[_Function], _Function] = numba.extending.register_jitable(
+    nogil=True, error_model="numpy", fastmath={"contract", "arcp"}, forceinline=False, **_INTERNAL
+)

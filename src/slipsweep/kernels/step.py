@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from slipsweep.jit.decorators import inlined, registered, scalar, single
+from slipsweep.jit.decorators import as_value, inlined, registered, scalar, single
 from slipsweep.kernels.block import (
     EQ12,
     FRICTION_ESTIMATED,
@@ -225,7 +225,7 @@ def friction_at(law: Law, block: Block, ground: float, velocity: float, slip: fl
     )
 
 
-@inlined
+@registered
 def eq4_rate(law: Law, block: Block, ground: float, velocity: float, slip: float) -> float:
     """Üg − Ü with Ü by Eq. 4; positive where a block at rest begins to slide."""
     friction = friction_at(law, block, ground, velocity, slip)
@@ -605,7 +605,7 @@ def place_beyond(
     return high
 
 
-@scalar
+@as_value
 def wait_for_eq4(
     law: Law,
     block: Block,

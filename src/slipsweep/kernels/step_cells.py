@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipsweep.jit.compiling import kernel
-from slipsweep.jit.decorators import inlined, registered, scalar, single
+from slipsweep.jit.decorators import as_value, inlined, registered, scalar, single
 from slipsweep.kernels.block import (
     FRICTION_ESTIMATED,
     LIMIT_UNDEFINED,
@@ -177,7 +177,7 @@ def walk_cycles(law: Law, block: Block, path: Path, steps: Steps, log: np.ndarra
             n += count
 
 
-@scalar
+@as_value
 def run_out(law: Law, block: Block, path: Path, steps: Steps, log: np.ndarray) -> None:
     """After the shaking Eq. 12 takes V to 0.
 

@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from slipsweep.jit.compiling import kernel
-from slipsweep.jit.decorators import inlined, registered, scalar
+from slipsweep.jit.decorators import as_value, inlined, registered, scalar
 from slipsweep.jit.elementary import exp
 from slipsweep.kernels.block import NOT_AT_REST, Options
 from slipsweep.kernels.step import (
@@ -70,13 +70,13 @@ def resistance(law: Law, block: Block, side: float, velocity: float, slip: float
     return eq.coulomb_yield_acceleration(friction, side * block.tan_theta, block.g)
 
 
-@inlined
+@registered
 def newmark_rate(law: Law, block: Block, ground: float, velocity: float, slip: float) -> float:
     """Üg − Ü of a block that slides."""
     return ground - block.side * resistance(law, block, block.side, velocity, slip)
 
 
-@scalar
+@as_value
 def wait_for_yield(
     law: Law,
     block: Block,
@@ -107,7 +107,7 @@ def wait_for_yield(
     return tau
 
 
-@scalar
+@as_value
 def come_to_rest(law: Law, block: Block, path: Path, steps: Steps, log: np.ndarray) -> None:
     """After the shaking the strength of the block takes V to 0, or never does.
 
