@@ -6,6 +6,7 @@ import signal
 import sys
 from collections import Counter
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
@@ -51,7 +52,7 @@ def _no_power_cut() -> Iterator[None]:
 
 
 #: What each process of the suite does first, to compile kernels that most tests need.
-FIRST = {
+FIRST: dict[str, tuple[dict[str, Any], ...]] = {
     "gw0": ({}, {"model": "newmark", "excitation": "square"}),
     "gw1": ({"excitation": "square"}, {"solver": "step"}),
 }

@@ -47,6 +47,7 @@ def test_runs_and_writes(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(sys, "argv", [name, "--tiny", "--folder", str(tmp_path)])
     with matplotlib.rc_context():  # some of the packages compared with set a font
         runpy.run_module(f"benchmarks.{name}", run_name="__main__")
+    matplotlib.use("agg")  # and choose a window to draw in
     for file in WRITES[name]:
         written = tmp_path / file
         kept = ROOT / "benchmarks" / "results" / file

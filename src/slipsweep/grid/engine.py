@@ -34,7 +34,7 @@ from slipsweep.motion.waveforms import Sine, Waveform, peak_acceleration
 #: Least and largest number of cells that a kernel solves in a call.  With fewer the time of Python
 #: counts; with more Ctrl-C, which is heard between two calls, is heard late.
 _LEAST_TILE = 16384
-_MOST_TILE = 65536
+_MOST_TILE = 32768
 
 #: Powers of 1/ω, or of the factor on a record's time, by which results scale; others do not.
 _POWERS = {

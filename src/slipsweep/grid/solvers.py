@@ -278,12 +278,12 @@ def cost_of(problem: Problem) -> int:
     if isinstance(motion, Waveform):
         if steps:
             return 1 + steps // 16
-        return 1 if is_plain_sine(motion) and not slides_both_ways(problem.model) else 4
+        return 1 if is_plain_sine(motion) and not slides_both_ways(problem.model) else 8
     records = motion if isinstance(motion, Suite) else (motion,)
     samples = max(record.times.size for record in records)
     if isinstance(problem.model, Newmark) and not steps:
         return max(8, samples // 4096)
-    return max(64, samples // 8) * math.ceil(max(steps, 1) / STEPS_PER_SAMPLE)
+    return max(64, samples // 16) * math.ceil(max(steps, 1) / STEPS_PER_SAMPLE)
 
 
 def memory_of(problem: Problem) -> int:
