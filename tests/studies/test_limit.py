@@ -227,6 +227,21 @@ def test_peaks_of_a_record_where_slips_become_one(seed: int, displacement: float
     assert 0.999 * first < limit <= first
 
 
+def test_a_peak_at_the_mode_limit_of_the_highest_of_many_pulses_is_found() -> None:
+    """Beyond it the block slides upslope in the long negative half wave: u falls at once."""
+    heights = np.linspace(0.05, 0.4, 200)
+    others = np.column_stack([heights, -heights]).ravel()
+    motion = Record.sampled([0.0, *others, 0.0, 1.0, -1.0, -1.0, -1.0, 0.0], 0.1)
+    given: dict[str, Any] = {"theta": 5.0, "mu_s": 0.3, "excitation": motion}
+    end = slipsweep.friction_parameters(5.0, 0.3, 5.0).limiting_acceleration.item()
+    near = end * np.array([1.0 - 1e-9, 1.0 + 1e-9])
+    before, after = sweep(amplitude=near, **given).permanent_displacement.values
+    assert after < 0.0 < before
+    target = before * (1.0 - 1e-10)
+    limit = limit_amplitude(target, **given, maximum_amplitude=1.5 * end).limit_amplitude.item()
+    assert (1.0 - 1e-8) * end < limit < end
+
+
 def test_cells_without_a_limit_say_why() -> None:
     limits = limit_amplitude(1e6, [0, 20], 0.3, 1.0)
     np.testing.assert_array_equal(

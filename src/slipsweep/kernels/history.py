@@ -39,9 +39,9 @@ def fill_history(
     samples[sampling.BLOCK_ACCELERATION] = ground  # at rest
     solve_walk(cells, options, path, walks, slides, lags, samples, results)
     # after a wave a block that slides continuously keeps its velocity
-    after = int(slides[0].sampled)
-    samples[sampling.VELOCITY, after:] = walks[0].velocity
-    samples[sampling.DISPLACEMENT, after:] = walks[0].displacement
+    after = int(slides["sampled"][0])
+    samples[sampling.VELOCITY, after:] = walks["velocity"][0]
+    samples[sampling.DISPLACEMENT, after:] = walks["displacement"][0]
     history.ground_acceleration[:] = ground
     history.block_acceleration[:] = samples[sampling.BLOCK_ACCELERATION]
     history.friction_coefficient[:] = eq.mobilised_friction(

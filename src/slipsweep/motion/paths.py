@@ -99,7 +99,7 @@ class Path(NamedTuple):
     base: Base
     intervals: np.ndarray  # of INTERVAL
     cycles: np.ndarray  # of CYCLE; the last one begins where the path ends
-    rises: np.ndarray  # (ranges, 2) all w > 0 that the base rises through, or jumps to
+    rises: np.ndarray  # (ranges, 2) all w > 0 that a wave rises through, or jumps to
     highest: float  # w
     lowest: float
     lead: int
@@ -144,7 +144,7 @@ def path_of(wave: Wave, recorded: bool) -> Path:
         base=Base(pieces, curves),
         intervals=intervals,
         cycles=cycles,
-        rises=_rises(wave.pieces),
+        rises=np.empty((0, 2)) if recorded else _rises(wave.pieces),
         highest=wave.highest,
         lowest=wave.lowest,
         lead=wave.lead,
