@@ -1,9 +1,9 @@
 """Solution of a grid: variables with named dimensions in, variables out.
 
-A grid is cut into tiles of some thousand cells, which threads solve.  NumPy gathers the inputs of a
-tile into an array of cells, and a kernel solves it (`slipsweep.grid.solvers`).  The results of the
-kernel are in units of phase; the scaling law, v = V/ω and u = W/ω², gives those at all frequencies
-of a cell.
+A grid is cut into tiles of up to some ten thousand cells, which threads solve.  NumPy gathers the
+inputs of a tile into an array of cells, and a kernel solves it (`slipsweep.grid.solvers`).  The
+results of the kernel are in units of phase; the scaling law, v = V/ω and u = W/ω², gives those at
+all frequencies of a cell.
 """
 
 import math
@@ -251,10 +251,10 @@ class Workspace:
     New arrays for each would come as new pages of memory, which take as long as the cells.
     """
 
-    def __init__(self, solver: solvers.Solver, tile: int) -> None:
-        self._cells = np.empty(tile, solver.cell)
-        self._rows = np.empty((1 + max(solver.rows.values())) * tile)
+    def __init__(self, solver: solvers.Solver, most: int) -> None:
+        self._cells = np.empty(most, solver.cell)
         self._row_count = 1 + max(solver.rows.values())
+        self._rows = np.empty(self._row_count * most)
 
     def arrays(self, count: int) -> tuple[NDArray[Any], NDArray[np.float64]]:
         """Return cells whose fields are all NaN, and the rows of their results."""
@@ -287,7 +287,7 @@ def _fill(
             inputs[name] = values[(*place, ...)]
         shape = tuple(chunk[dim].stop - chunk[dim].start if dim in chunk else 1 for dim in dims)
         if not hasattr(workspaces, "own"):
-            workspaces.own = Workspace(solver, tile)
+            workspaces.own = Workspace(solver, min(tile, math.prod(solved.values())))
         _fill_tile(targets, request.problem, inputs, shape, solver, workspaces.own, finite)
         request.count(next(iter(targets.values())).size)
 
