@@ -48,7 +48,6 @@ def test_numpy_functions_apply_to_results(result: xr.Dataset, chunks: int | None
 
 
 def test_plots_have_names_and_units(result: xr.Dataset) -> None:
-    plt.switch_backend("agg")  # a program of others may have chosen a window
     result.permanent_displacement.isel(theta=0).plot.line(x="amplitude", hue="mu_s")
     labels = [" ".join(text.split()) for text in (plt.gca().get_xlabel(), plt.gca().get_ylabel())]
     assert labels == ["peak ground acceleration [m s-2]", "permanent displacement, downslope [m]"]

@@ -209,7 +209,7 @@ LONG = {
     ),
     "step": (
         "np.linspace(0, 20, 20), np.linspace(0.2, 0.9, 20), np.linspace(0.5, 13, 50), 1.0, "
-        "solver=slipsweep.Step(steps_per_cycle=100_000), variables=['permanent_displacement']",
+        "solver=slipsweep.Step(steps_per_cycle=1_000_000), variables=['permanent_displacement']",
         20 * 20 * 50,
     ),
 }

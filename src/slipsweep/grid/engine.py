@@ -270,7 +270,8 @@ def _fill(
     scaled = _scaled_dimension(request)
     dims = tuple(request.sizes)
     solved = {dim: size for dim, size in request.sizes.items() if dim != scaled}
-    share = math.prod(solved.values()) // (8 * threads.thread_count())
+    count = math.prod(solved.values())
+    share = count // (8 * threads.thread_count())
     tile = max(min(max(share, _LEAST_TILE), _MOST_TILE) // solvers.cost_of(request.problem), 1)
     arrays = {name: values.set_dims(dims).values for name, values in request.inputs.items()}
     workspaces = threading.local()
@@ -287,7 +288,7 @@ def _fill(
             inputs[name] = values[(*place, ...)]
         shape = tuple(chunk[dim].stop - chunk[dim].start if dim in chunk else 1 for dim in dims)
         if not hasattr(workspaces, "own"):
-            workspaces.own = Workspace(solver, min(tile, math.prod(solved.values())))
+            workspaces.own = Workspace(solver, min(tile, count))
         _fill_tile(targets, request.problem, inputs, shape, solver, workspaces.own, finite)
         request.count(next(iter(targets.values())).size)
 
@@ -300,7 +301,7 @@ def _fill_tile(
     inputs: Mapping[str, NDArray[Any]],
     shape: tuple[int, ...],
     solver: solvers.Solver,
-    workspace: "Workspace",
+    workspace: Workspace,
     finite: bool,
 ) -> None:
     """Solve the cells of a tile, and write the results at all frequencies of each cell.
@@ -310,12 +311,12 @@ def _fill_tile(
     names = solver.cell.names
     assert names is not None
     cells, rows = workspace.arrays(math.prod(shape))
-    cells = cells.reshape(shape)
+    on_dimensions = cells.reshape(shape)
     with np.errstate(all="ignore"):  # results that overflow are refused below
         for name, values in cell_inputs(problem, inputs).items():
             if name in names:
-                cells[name] = values
-        solver.solve(cells.reshape(-1), rows)
+                on_dimensions[name] = values
+        solver.solve(cells, rows)
         validity = rows[solver.rows["validity"]].reshape(shape).astype(np.int16)
         is_unsolved = validity & UNSOLVED != 0
         if is_unsolved.any():

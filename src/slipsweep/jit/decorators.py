@@ -47,15 +47,23 @@ single = part("arcp", inline="always", **_INTERNAL)
 #: The same for elementary functions, which have no division to share.
 elementary = part("nsz", forceinline=True)
 
+#: Options of functions of Python that kernels compile.
+_PLAIN = {
+    "nogil": True,
+    "error_model": "numpy",
+    "fastmath": {"contract", "arcp"},
+    **_INTERNAL,
+}
+
 #: An equation: a function of Python, which kernels compile like `inlined`.  So it may be passed to
 #: them as a value, too.
 equation: Callable[[_Function], _Function] = numba.extending.register_jitable(
-    nogil=True, error_model="numpy", fastmath={"contract", "arcp"}, forceinline=True, **_INTERNAL
+    forceinline=True, **_PLAIN
 )
 registered = equation
 
 #: The same for a long function, which is not inlined.  A kernel that has a compiled function, like
 #: `scalar`, for a value is not kept on disk: numba would have to keep its address.
 as_value: Callable[[_Function], _Function] = numba.extending.register_jitable(
-    nogil=True, error_model="numpy", fastmath={"contract", "arcp"}, forceinline=False, **_INTERNAL
+    forceinline=False, **_PLAIN
 )

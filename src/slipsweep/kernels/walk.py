@@ -289,8 +289,9 @@ def walk_pulses(
         flags = 0
         if continuous:
             find_velocity_extremes(block, options.wants_peak, path, slide)
-            velocity = walk.velocity
-            continuous_pulse(block, path, k, start, following, ends, velocity, slide, lags, samples)
+            continuous_pulse(
+                block, path, k, start, following, ends, walk.velocity, slide, lags, samples
+            )
         else:
             # v never goes below 0: a velocity upslope, left by a continuous pulse, is neglected
             begin_pulse(slide, max(walk.velocity, 0.0))

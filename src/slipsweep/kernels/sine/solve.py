@@ -154,8 +154,6 @@ def solve_sine(cells: np.ndarray, options: Options, alone: bool, results: np.nda
     """
     # zeros: a NaN in a lane that a kind does not set would keep its iterations from ending
     batches = np.zeros(kinds.KINDS + 1, BATCH)
-    for kind in range(kinds.KINDS):
-        batches[kind].used = 0
     loaded = batches[kinds.KINDS]
     for first in range(0, cells.size, WIDTH):
         load(cells, first, loaded)
